@@ -31,7 +31,7 @@ use touch2touch_pipeline::steps::imprint::{self, imprint_of};
 use touch2touch_pipeline::steps::on_pad::OnPad;
 use touch2touch_pipeline::steps::prediction::Prediction;
 
-use report::{COLOR_CONVENTION, Pair, Report, Stored, Unit, convention, mean, take, text};
+use report::{COLOR_CONVENTION, Figures, Pair, Report, Stored, Unit, convention, mean, text};
 use write::{write, write_color};
 
 /// Arguments of `generate`.
@@ -105,14 +105,14 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
                 if let Some(difference) = imprint::color(&predicted, [0, 0])? {
                     unit = Unit::Levels;
                     write_color(&stem, &difference)?;
-                    score_color(&difference, touch, &mut pair)?;
+                    score_color(&difference, touch, &mut pair.figures)?;
                     made.push(pair);
                     continue;
                 }
                 let imprint = imprint_of(&predicted, shift, &sample, finger)?;
                 write(&stem, &imprint)?;
                 let (drawn, on) = (Some((&predicted, shift)), OnPad { sample: &sample, pad: finger });
-                score(&dataset, id, on, (&imprint, drawn), &mut pair)?;
+                score(&dataset, id, on, (&imprint, drawn), &mut pair.figures)?;
                 made.push(pair);
             }
             Ok(made)
@@ -146,12 +146,12 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
 }
 
 /// Fills in the figures of a predicted color picture against the measured one.
-fn score_color(difference: &RgbGrid, touch: &PadTouch, pair: &mut Pair) -> anyhow::Result<()> {
+fn score_color(difference: &RgbGrid, touch: &PadTouch, figures: &mut Figures) -> anyhow::Result<()> {
     if let Some(measured) = touch.color() {
         let [w, h] = measured.difference.size();
         let sized = resample::bilinear_rgb(difference, w, h);
         let (psnr, ssim) = metrics::color(&sized, &measured.difference)?;
-        (pair.psnr_db, pair.ssim) = (psnr.db(), Some(ssim));
+        (figures.psnr_db, figures.ssim) = (psnr.db(), Some(ssim));
     }
     Ok(())
 }
@@ -162,18 +162,18 @@ fn score(
     id: PairId,
     OnPad { sample, pad }: OnPad<'_>,
     (imprint, drawn): (&DepthMap, Option<(&Prediction, ShiftMode)>),
-    pair: &mut Pair,
+    figures: &mut Figures,
 ) -> anyhow::Result<()> {
     let tile = compare::tile_of(dataset, id, sample)?;
     if let Some(found) = compare::of_pad(imprint, drawn, sample, pad, tile.as_ref())? {
-        take(pair, &found);
+        (figures.psnr_db, figures.ssim, figures.unstretched) = (found.psnr_db, found.ssim, found.unstretched);
     }
     if let Some(tile) = tile
         && let Some(vqvae) = compare::beside(dataset, id, sample)?
     {
         let theirs = compare::compare(&vqvae.tile, &tile, sample.scale)?;
-        (pair.vqvae_psnr_db, pair.vqvae_ssim) = (theirs.psnr_db, theirs.ssim);
-        pair.vqvae = theirs.unstretched.map(Stored);
+        (figures.vqvae_psnr_db, figures.vqvae_ssim) = (theirs.psnr_db, theirs.ssim);
+        figures.vqvae = theirs.unstretched.map(Stored);
     }
     Ok(())
 }

@@ -47,8 +47,6 @@ pub struct Lifted {
     pub pixels: Vec<[u16; 2]>,
     /// Pixels of the mask without a usable depth: NaN, infinite, zero or negative. They have no point.
     pub invalid: usize,
-    /// Pixels that the mask leaves out.
-    pub outside_mask: usize,
 }
 
 /// Lifts the pixels of `imprint` that `mask` contains (all without one) to the grasp frame.
@@ -71,7 +69,6 @@ pub fn lift(imprint: &DepthMap, camera: &DepthCamera, mask: Option<&Mask>) -> Re
     let taken = mask.map_or(imprint.len(), |m| m.as_slice().iter().filter(|&&m| m).count());
     lifted.points.reserve_exact(taken);
     lifted.pixels.reserve_exact(taken);
-    lifted.outside_mask = imprint.len() - taken;
     for y in 0..imprint.height() {
         let pixels = imprint.row(y).iter().zip(camera.depth_reference.row(y)).enumerate();
         let mask = mask.map(|mask| mask.row(y));
@@ -185,7 +182,7 @@ mod tests {
         let mut mask = Mask::filled(4, 2, true);
         mask[(3, 1)] = false;
         let lifted = lift(&imprint, &camera, Some(&mask)).unwrap();
-        assert_eq!((lifted.invalid, lifted.outside_mask), (5, 1));
+        assert_eq!(lifted.invalid, 5);
         assert_eq!(lifted.pixels, [[1, 1], [2, 1]]);
     }
 

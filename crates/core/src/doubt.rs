@@ -24,6 +24,7 @@ use std::collections::BTreeMap;
 
 use super::frames::PlanarPose;
 use super::mesh::TriMesh;
+use super::moments::median;
 use super::read_as::ReadAs;
 use super::rig::PerPad;
 use super::sample::{PadTouch, Reading, Sample};
@@ -265,13 +266,6 @@ fn only(sample: &Sample, color: bool) -> Sample {
         taken_by: *taken_by,
         notes: Vec::new(),
     }
-}
-
-/// The value in the middle; `None` of nothing.
-fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
-    let mut values: Vec<f64> = values.into_iter().filter(|v| v.is_finite()).collect();
-    let middle = values.len() / 2;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 /// Gain of a reading: how much better pairs are under it than as they are stored.

@@ -15,5 +15,5 @@ pub use color::{LEVELS, color, planes};
 pub use frechet::frechet_distance;
 pub use image::{MetricError, Psnr, mse, psnr, unit_range};
 pub use line::{Line, line};
-pub use ssim::{Ssim, SsimRange, ssim};
+pub use ssim::{SsimRange, ssim};
 pub use unstretched::{Unstretched, unstretched};

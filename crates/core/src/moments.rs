@@ -4,6 +4,13 @@
 //! not swallow a small spread, and a constant has none. The figures depend on the order of the numbers in their last
 //! bits only, so a pass adds them in the data set's order.
 
+/// The value in the middle of those that are finite; `None` of nothing.
+pub(crate) fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
+    let mut values: Vec<f64> = values.into_iter().filter(|v| v.is_finite()).collect();
+    let middle = values.len() / 2;
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
 /// A sum with what its roundings lost.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sum {

@@ -188,7 +188,6 @@ fn split_of(dataset: &Dataset, choice: ExportChoice) -> ExportConfig {
         by_tool: choice.by_tool,
         held_out_in_train: choice.test_in_train,
         rig: dataset.rig.clone(),
-        ..ExportConfig::default()
     }
 }
 
@@ -227,8 +226,7 @@ pub fn plan(dataset: &Dataset, masks: &DrawnMasks<'_>, setup: &ExportSetup) -> R
             plan.ids.push(id);
         }
     }
-    plan.counts =
-        exchange::counts(&plan.entries, &split_of(dataset, choice)).map_err(|err| TaskError::from_error(WHAT, &err))?;
+    plan.counts = exchange::counts(&plan.entries, &split_of(dataset, choice));
     plan.drawn = drawn;
     Ok(plan)
 }

@@ -280,7 +280,7 @@ impl Following {
         let before: Vec<(PathBuf, Option<SystemTime>)> =
             self.folders.iter().map(|(folder, _)| (folder.clone(), modified(folder))).collect();
         let grown = match &self.dataset {
-            Some(dataset) => dataset.grown().map(|growth| growth.dataset),
+            Some(dataset) => dataset.grown(),
             None => Dataset::open(&self.path),
         };
         self.troubles.clear();

@@ -33,7 +33,7 @@ pub(crate) fn ssim(
 ) -> PyResult<f64> {
     let (prediction, truth) = (image_of(&prediction, "prediction")?, image_of(&truth, "truth")?);
     let range = data_range.map_or(SsimRange::OfPrediction, SsimRange::Explicit);
-    Ok(metrics::ssim(&prediction, &truth, range).map_err(refused)?.mean)
+    metrics::ssim(&prediction, &truth, range).map_err(refused)
 }
 
 /// Fréchet distance of two sets of features (N, D), float32: pytorch-fid's on the same features. With few vectors it is

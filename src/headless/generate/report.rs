@@ -8,7 +8,6 @@ use touch2touch_core::findings::Finding;
 use touch2touch_core::metrics::Unstretched;
 use touch2touch_core::rig::Text;
 use touch2touch_core::sample::Scale;
-use touch2touch_pipeline::compare::Comparison;
 
 /// Unit of a prediction's errors.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -22,11 +21,9 @@ pub(super) enum Unit {
 pub(super) const COLOR_CONVENTION: &str = "difference image of the color sensor on the 0..255 scale, peak and range 255; the split \
     by footprint, contact and pose need depth and are left out";
 
-/// Metrics of one prediction. PSNR and SSIM are those of `convention`.
+/// Metrics of predictions. PSNR and SSIM are those of `convention`.
 #[derive(Debug, Default, Clone, Serialize)]
-pub(super) struct Pair {
-    pub(super) name: String,
-    pub(super) finger: Text,
+pub(super) struct Figures {
     pub(super) psnr_db: Option<f64>,
     pub(super) ssim: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -38,6 +35,15 @@ pub(super) struct Pair {
     pub(super) unstretched: Option<Unstretched>,
     #[serde(flatten)]
     pub(super) vqvae: Option<Stored>,
+}
+
+/// One prediction.
+#[derive(Debug, Default, Clone, Serialize)]
+pub(super) struct Pair {
+    pub(super) name: String,
+    pub(super) finger: Text,
+    #[serde(flatten)]
+    pub(super) figures: Figures,
     /// Verdict on whether the GelSlim image tells where on the tool it is.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) ambiguity: Option<Ambiguity>,
@@ -49,16 +55,8 @@ pub(super) struct Pair {
 
 #[derive(Debug, Serialize)]
 pub(super) struct Mean {
-    pub(super) psnr_db: Option<f64>,
-    pub(super) ssim: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) vqvae_psnr_db: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) vqvae_ssim: Option<f64>,
     #[serde(flatten)]
-    pub(super) unstretched: Option<Unstretched>,
-    #[serde(flatten)]
-    pub(super) vqvae: Option<Stored>,
+    pub(super) figures: Figures,
     /// Pairs whose GelSlim image leaves the place along a bare shaft open.
     pub(super) ambiguous: usize,
     pub(super) seconds: Option<f64>,
@@ -120,22 +118,19 @@ pub(super) fn convention(scale: Scale) -> &'static str {
     }
 }
 
-pub(super) fn take(pair: &mut Pair, found: &Comparison) {
-    (pair.psnr_db, pair.ssim, pair.unstretched) = (found.psnr_db, found.ssim, found.unstretched);
-}
-
 pub(super) fn mean(pairs: &[Pair]) -> Mean {
-    let of = |get: fn(&Pair) -> Option<f64>| evaluation::mean(pairs.iter().filter_map(get));
-    Mean {
-        psnr_db: of(|p| p.psnr_db),
-        ssim: of(|p| p.ssim),
-        vqvae_psnr_db: of(|p| p.vqvae_psnr_db),
-        vqvae_ssim: of(|p| p.vqvae_ssim),
-        unstretched: unstretched_mean(pairs.iter().filter_map(|p| p.unstretched)),
-        vqvae: unstretched_mean(pairs.iter().filter_map(|p| Some(p.vqvae?.0))).map(Stored),
-        ambiguous: pairs.iter().filter(|p| p.ambiguity.is_some_and(|a| a.kind == TouchKind::BareShaft)).count(),
-        seconds: of(|p| Some(p.seconds)),
-    }
+    let of = |get: fn(&Figures) -> Option<f64>| evaluation::mean(pairs.iter().filter_map(|pair| get(&pair.figures)));
+    let figures = Figures {
+        psnr_db: of(|f| f.psnr_db),
+        ssim: of(|f| f.ssim),
+        vqvae_psnr_db: of(|f| f.vqvae_psnr_db),
+        vqvae_ssim: of(|f| f.vqvae_ssim),
+        unstretched: unstretched_mean(pairs.iter().filter_map(|p| p.figures.unstretched)),
+        vqvae: unstretched_mean(pairs.iter().filter_map(|p| Some(p.figures.vqvae?.0))).map(Stored),
+    };
+    let ambiguous = |pair: &&Pair| pair.ambiguity.is_some_and(|a| a.kind == TouchKind::BareShaft);
+    let seconds = evaluation::mean(pairs.iter().map(|pair| pair.seconds));
+    Mean { figures, ambiguous: pairs.iter().filter(ambiguous).count(), seconds }
 }
 
 /// The report as a table of its pairs.
@@ -146,26 +141,26 @@ pub(super) fn text(report: &Report) -> String {
         "{:<44} {:>8} {:>6} {:>12} {:>10} {:>8}\n",
         "pair", "PSNR dB", "SSIM", "VQ-VAE dB", "VQ-VAE SSIM", "seconds"
     );
-    let mut line = |name: &str, p: &Mean, note: &str| {
+    let mut line = |name: &str, p: &Figures, seconds: Option<f64>, note: &str| {
         text += &format!(
             "{name:<44} {:>8} {:>6} {:>12} {:>10} {:>8}{note}\n",
             number(p.psnr_db, 1),
             number(p.ssim, 3),
             number(p.vqvae_psnr_db, 1),
             number(p.vqvae_ssim, 3),
-            number(p.seconds, 2)
+            number(seconds, 2)
         );
     };
     for p in pairs {
         let name = format!("{} {}", p.name, p.finger);
         let note = p.ambiguity.and_then(|a| a.caption()).map_or(String::new(), |c| format!("  {c}"));
-        line(&name, &mean(std::slice::from_ref(p)), &note);
+        line(&name, &p.figures, Some(p.seconds), &note);
     }
-    line("mean", &report.mean, "");
+    line("mean", &report.mean.figures, report.mean.seconds, "");
     text + &format!(
         "{}\n{}\n{} of {} GelSlim images are ambiguous \
          (bare shaft); {} steps, seed {}, {} on {}\n",
-        unstretched_text(&report.mean),
+        unstretched_text(&report.mean.figures),
         report.convention,
         report.mean.ambiguous,
         pairs.len(),
@@ -177,7 +172,7 @@ pub(super) fn text(report: &Report) -> String {
 }
 
 /// The means that do not stretch, as a line of their own.
-fn unstretched_text(mean: &Mean) -> String {
+fn unstretched_text(mean: &Figures) -> String {
     let number = |v: Option<f64>, digits: usize| v.map_or("-".to_owned(), |v| format!("{v:.digits$}"));
     let Some(own) = mean.unstretched else { return String::new() };
     let line = |of: Unstretched| {

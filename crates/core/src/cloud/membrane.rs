@@ -196,7 +196,10 @@ mod tests {
     /// The pixel of each corner.
     fn pixels(mesh: &TriMesh) -> Vec<[f64; 2]> {
         let camera = testing::camera(SIZE[0], SIZE[1]);
-        let pixel = |p: &DVec3| super::super::project(&camera, *p).unwrap().to_array();
+        let pixel = |p: &DVec3| {
+            let (u, v) = camera.project(camera.grasp_from_camera.inverse().transform_point3(*p)).unwrap();
+            [u, v]
+        };
         mesh.vertices.iter().map(pixel).collect()
     }
 

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use strum::EnumIter;
 
 use super::region;
+use crate::moments::median;
 
 /// Layers of points that lie behind each other: which of them a drawing reaches.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, EnumIter)]
@@ -191,19 +192,13 @@ impl VisiblePixels {
     }
 }
 
-fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let mut values: Vec<f64> = values.collect();
-    let middle = values.len() / 2;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
-}
-
 /// The distance between points of neighboring pixels of a row, meters, median.
 fn spacing(points: &[DVec3], pixels: &[[u16; 2]]) -> Option<f64> {
     let neighbors = points
         .windows(2)
         .zip(pixels.windows(2))
         .filter(|(_, pixels)| pixels[0][1] == pixels[1][1] && pixels[1][0] - pixels[0][0] == 1);
-    median(neighbors.map(|(p, _)| p[0].distance(p[1])).filter(|d| d.is_finite()))
+    median(neighbors.map(|(p, _)| p[0].distance(p[1])))
 }
 
 #[cfg(test)]

@@ -23,7 +23,7 @@ pub fn color(prediction: &RgbGrid, truth: &RgbGrid) -> Result<(Psnr, f64), Metri
     let mut similar = 0.0;
     for channel in 0..3 {
         let plane = |picture: &RgbGrid| picture.map(|pixel| pixel[channel]);
-        similar += ssim(&plane(prediction), &plane(truth), SsimRange::Explicit(LEVELS))?.mean / 3.0;
+        similar += ssim(&plane(prediction), &plane(truth), SsimRange::Explicit(LEVELS))? / 3.0;
     }
     Ok((psnr, similar))
 }

@@ -28,7 +28,7 @@ pub struct Unstretched {
 pub fn unstretched(prediction: &Grid<f32>, truth: &Grid<f32>, range: f64) -> Result<Unstretched, MetricError> {
     Ok(Unstretched {
         psnr_raw_db: psnr(prediction, truth, range)?.db(),
-        ssim_raw: ssim(prediction, truth, SsimRange::Explicit(range)).ok().map(|similarity| similarity.mean),
+        ssim_raw: ssim(prediction, truth, SsimRange::Explicit(range)).ok(),
         psnr_line_db: psnr_of_mse(line_mse(prediction, truth)?, range)?.db(),
     })
 }

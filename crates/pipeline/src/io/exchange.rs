@@ -84,14 +84,6 @@ pub enum ExportError {
         /// Pair and finger, and why; all of them.
         failures: Vec<(String, String)>,
     },
-    /// Shares that are not shares.
-    #[error("shares of validation {val} and test {test} must be at least 0 and below 1 together")]
-    Shares {
-        /// Validation.
-        val: f64,
-        /// Test.
-        test: f64,
-    },
     /// The written folder is not one that the loader accepts, or not the one that was meant.
     #[error("the written folder failed its check: {}", first(problems))]
     Check {
@@ -136,14 +128,8 @@ pub struct ExportEntry {
 pub struct ExportConfig {
     /// Decides which pair lands where; the same seed and pairs give the same parts.
     pub seed: u64,
-    /// Share of pairs for validation.
-    pub val: f64,
-    /// Share of pairs for test.
-    pub test: f64,
     /// True where all pairs of a tool go to the same part; else each pair goes by itself.
     pub by_tool: bool,
-    /// Tools whose pairs all go to test (unseen tools).
-    pub test_tools: Vec<String>,
     /// True where held-out pairs are divided like the rest; else they go to test.
     pub held_out_in_train: bool,
     /// The names of the pads.
@@ -152,15 +138,7 @@ pub struct ExportConfig {
 
 impl Default for ExportConfig {
     fn default() -> Self {
-        Self {
-            seed: 0,
-            val: 0.1,
-            test: 0.1,
-            by_tool: false,
-            test_tools: Vec::new(),
-            held_out_in_train: false,
-            rig: Rig::lab(),
-        }
+        Self { seed: 0, by_tool: false, held_out_in_train: false, rig: Rig::lab() }
     }
 }
 
@@ -171,12 +149,8 @@ pub struct ExportReport {
     pub counts: [usize; 3],
     /// Pixels below or above the range of the image; they were limited to it.
     pub out_of_range_px: usize,
-    /// Pixels of which their masks say nothing.
-    pub ignored_px: usize,
     /// Pixels without measurement; in images they are an imprint of 0.
     pub unmeasured_px: usize,
-    /// Parts without any image: the lab's trainer refuses those.
-    pub empty_parts: Vec<&'static str>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -250,13 +224,10 @@ pub struct Content {
 }
 
 /// Number of `entries` that go to each of [`PARTS`].
-///
-/// # Errors
-/// [`ExportError::Shares`].
-pub fn counts(entries: &[ExportEntry], config: &ExportConfig) -> Result<[usize; 3], ExportError> {
+pub fn counts(entries: &[ExportEntry], config: &ExportConfig) -> [usize; 3] {
     let mut counts = [0; 3];
-    split::parts(entries, config)?.into_iter().for_each(|part| counts[part] += 1);
-    Ok(counts)
+    split::parts(entries, config).into_iter().for_each(|part| counts[part] += 1);
+    counts
 }
 
 /// Writes `entries` to `folder`; `load(i)` gives the content of `entries[i]`.
@@ -277,7 +248,7 @@ pub fn export(
     }
     let folder = std::path::absolute(folder).map_err(|s| io(folder, "find the folder", s))?;
     refuse_foreign(&folder)?;
-    let parts = split::parts(entries, config)?;
+    let parts = split::parts(entries, config);
     let stems = split::stems(entries, &config.rig);
     let parent = folder.parent().unwrap_or(&folder).to_owned();
     std::fs::create_dir_all(&parent).map_err(|s| io(&parent, "make the folder", s))?;
@@ -318,8 +289,6 @@ pub fn export(
             }
         }
         content.ignored = content.ignored.filter(|ignored| ignored.as_slice().contains(&true));
-        let ignored = content.ignored.iter().flat_map(Mask::as_slice).filter(|v| **v);
-        report.ignored_px += ignored.count();
         report.counts[part] += 1;
         let to = root.join(PARTS[part]);
         unet::write(&to, stem, &content, &mut report).map_err(|err| meant(err, &root, &folder))?;
@@ -344,7 +313,6 @@ pub fn export(
     // Once more, in case something appeared while the masks were computed.
     refuse_foreign(&folder)?;
     staging.put(&folder).map_err(|source| io(&folder, "put the export to", source))?;
-    report.empty_parts = PARTS.iter().zip(report.counts).filter(|(_, n)| *n == 0).map(|(p, _)| *p).collect();
     Ok(report)
 }
 

@@ -31,15 +31,10 @@ use touch2touch_core::rig::{PadId, Rig};
 pub const FOLDER: &str = "touch2touch_masks";
 const FORMAT: &str = "touch2touch-mask";
 const REVIEW_FORMAT: &str = "touch2touch-review";
-const VERSION: u32 = 1;
 /// Masks, which say where each pixel comes from.
 const MASK_VERSION: u32 = 2;
-/// Reviews whose accepted poses were set by hand; others are written as version 1.
-const HAND_VERSION: u32 = 2;
-/// Reviews with a note: an older program would write them back without it.
-const NOTE_VERSION: u32 = 3;
-/// Reviews with poses that say of which prediction they were accepted.
-const PREDICTED_VERSION: u32 = 4;
+/// Reviews; those that say less were written as versions from 1 on, and are read alike.
+const REVIEW_VERSION: u32 = 4;
 const MASK_SUFFIX: &str = ".mask.json";
 const PREDICTED_SUFFIX: &str = ".predicted.json";
 const PREDICTED_FORMAT: &str = "touch2touch-predicted-masks";
@@ -150,18 +145,6 @@ pub struct StoredReview {
     /// Note that a person wrote about the pair; empty for none.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub note: String,
-}
-
-impl StoredReview {
-    /// An older program must not read a pose or a note without what it cannot know; all other files it still reads.
-    fn version(&self) -> u32 {
-        match self {
-            Self { accepted, .. } if !accepted.accepted_predicted.is_empty() => PREDICTED_VERSION,
-            Self { note, .. } if !note.is_empty() => NOTE_VERSION,
-            Self { accepted, .. } if accepted.values().any(|a| a.by_hand) => HAND_VERSION,
-            _ => VERSION,
-        }
-    }
 }
 
 /// Seconds since 1970, for [`StoredMask::saved_unix_s`]; 0 if the clock is set before that.
@@ -429,7 +412,7 @@ impl MaskStore {
     /// As [`MaskStore::save`].
     pub fn save_review(&self, pair: &str, review: &StoredReview) -> Result<(), StoreError> {
         self.load_review(pair)?;
-        let (format, version) = (REVIEW_FORMAT.into(), review.version());
+        let (format, version) = (REVIEW_FORMAT.into(), REVIEW_VERSION);
         let content = ReviewFile { format, version, pair: pair.into(), review: review.clone() };
         self.write(&self.folder.join(review_name(pair)), &content)
     }
@@ -562,7 +545,7 @@ fn contact_px(mask: &Mask) -> usize {
 fn parse_review(file: &Path, bytes: &[u8]) -> Result<ReviewFile, StoreError> {
     let content: ReviewFile = serde_json::from_slice(bytes)
         .map_err(|err| StoreError::Damaged { file: file.to_owned(), reason: err.to_string() })?;
-    check_format(file, &content.format, REVIEW_FORMAT, content.version, VERSION..=PREDICTED_VERSION)?;
+    check_format(file, &content.format, REVIEW_FORMAT, content.version, 1..=REVIEW_VERSION)?;
     if content.review.accepted.values().any(|a| !a.pose.is_finite()) {
         let reason = "an accepted pose is not a finite number".into();
         return Err(StoreError::Damaged { file: file.to_owned(), reason });

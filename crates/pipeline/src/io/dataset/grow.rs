@@ -16,17 +16,6 @@ use touch2touch_core::sample::{DepthCamera, Sample};
 /// A bubble file of the rig, in the root of a data set: its cameras serve touches that have no bubble file.
 pub(crate) const RIG_FILE: &str = "rig.pt";
 
-/// A data set after its folder was read again.
-#[derive(Debug)]
-pub struct Growth {
-    /// The data set: pairs known before keep their ids, also where their files are gone.
-    pub dataset: Dataset,
-    /// The pairs that were not there before.
-    pub new: Vec<PairId>,
-    /// Pairs known before that have other files now, such as a bubble that came later.
-    pub changed: Vec<PairId>,
-}
-
 /// Touches of another kind beside those of the data set.
 fn other_kind(root: &Path, what: &str, mine: &str) -> Problem {
     problem(
@@ -37,14 +26,12 @@ fn other_kind(root: &Path, what: &str, mine: &str) -> Problem {
 }
 
 impl Dataset {
-    /// Reads the folder again, for pairs that appeared.
+    /// The data set after its folder was read again: pairs known before keep their ids, also where their files are gone.
     ///
     /// # Errors
     /// [`OpenError`]; [`OpenError::NothingFound`] also where the folder now holds another kind of data set only.
-    pub fn grown(&self) -> Result<Growth, OpenError> {
-        let Some(root) = &self.root else {
-            return Ok(Growth { dataset: self.clone(), new: Vec::new(), changed: Vec::new() });
-        };
+    pub fn grown(&self) -> Result<Self, OpenError> {
+        let Some(root) = &self.root else { return Ok(self.clone()) };
         drop(std::fs::read_dir(root).map_err(|source| OpenError::Io { path: root.clone(), source })?);
         // Of the same kind: something else that comes into the folder must not hide what is known.
         let scan = match &self.source {
@@ -69,19 +56,17 @@ impl Dataset {
         if let Some(cameras) = self.cameras.get().filter(|cameras| !cameras.is_empty()) {
             dataset.cameras.set(cameras.clone()).ok();
         }
-        let (mut new, mut changed) = (Vec::new(), Vec::new());
         for (at, entry) in fresh.index.pairs.iter().enumerate() {
             let at = PairId(at as u32);
             match known.get(entry.name.as_str()) {
                 Some(&old) => {
                     let old = PairId(old as u32);
-                    if self.pair_files(old) != fresh.pair_files(at) && dataset.take(&fresh, at, Some(old)) {
-                        changed.push(old);
+                    if self.pair_files(old) != fresh.pair_files(at) {
+                        dataset.take(&fresh, at, Some(old));
                     }
                 }
                 None => {
                     if dataset.take(&fresh, at, None) {
-                        new.push(PairId(dataset.index.pairs.len() as u32));
                         dataset.index.pairs.push(entry.clone());
                     }
                 }
@@ -93,7 +78,7 @@ impl Dataset {
             (Source::Depths(mine), Source::Depths(other)) => mine.meshes.clone_from(&other.meshes),
             _ => {}
         }
-        Ok(Growth { dataset, new, changed })
+        Ok(dataset)
     }
 
     /// Files in the folder that look like touches and are none of the pairs: of another kind, or of the same name as

@@ -6,7 +6,11 @@ use sha2::Digest as _;
 
 use touch2touch_core::rig::Rig;
 
-use super::{ExportConfig, ExportEntry, ExportError};
+use super::{ExportConfig, ExportEntry};
+
+/// Shares of the pairs that go to validation and to test.
+const VAL: f64 = 0.1;
+const TEST: f64 = 0.1;
 
 fn hash(seed: u64, text: &str) -> [u8; 32] {
     let mut hasher = sha2::Sha256::new();
@@ -17,19 +21,12 @@ fn hash(seed: u64, text: &str) -> [u8; 32] {
 
 /// The part (0 train, 1 val, 2 test) of each entry, by its group's name and the seed alone: entries that come later
 /// change nothing for those before, but where a part would be empty.
-pub(super) fn parts(entries: &[ExportEntry], config: &ExportConfig) -> Result<Vec<usize>, ExportError> {
-    let (val, test) = (config.val, config.test);
-    if !(val >= 0.0 && test >= 0.0 && val + test < 1.0) {
-        return Err(ExportError::Shares { val, test });
-    }
+pub(super) fn parts(entries: &[ExportEntry], config: &ExportConfig) -> Vec<usize> {
     let group = |entry: &'_ ExportEntry| match &entry.tool {
         Some(tool) if config.by_tool => tool.clone(),
         _ => entry.pair.clone(),
     };
-    let is_unseen = |entry: &ExportEntry| {
-        (entry.held_out && !config.held_out_in_train)
-            || entry.tool.as_ref().is_some_and(|tool| config.test_tools.contains(tool))
-    };
+    let is_unseen = |entry: &ExportEntry| entry.held_out && !config.held_out_in_train;
     let place = |name: &str| {
         let [a, b, c, d, e, f, g, h, ..] = hash(config.seed, name);
         u64::from_be_bytes([a, b, c, d, e, f, g, h]) as f64 / 2f64.powi(64)
@@ -37,12 +34,12 @@ pub(super) fn parts(entries: &[ExportEntry], config: &ExportConfig) -> Result<Ve
     let names: BTreeSet<String> = entries.iter().filter(|e| !is_unseen(e)).map(group).collect();
     let mut places: Vec<(f64, String)> = names.into_iter().map(|name| (place(&name), name)).collect();
     places.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let by_place = |at: f64| if at < val { 1 } else { 2 * usize::from(at < val + test) };
+    let by_place = |at: f64| if at < VAL { 1 } else { 2 * usize::from(at < VAL + TEST) };
     let mut parts: Vec<usize> = places.iter().map(|(at, _)| by_place(*at)).collect();
     // The lab's trainer refuses an empty part: each wanted one takes its nearest, as soon as every part can have one.
     if parts.len() >= 3 {
         let held_out = entries.iter().any(is_unseen);
-        for (part, wanted) in [(1, val > 0.0), (2, test > 0.0 && !held_out), (0, true)] {
+        for (part, wanted) in [(1, true), (2, !held_out), (0, true)] {
             if !wanted || parts.contains(&part) {
                 continue;
             }
@@ -58,7 +55,7 @@ pub(super) fn parts(entries: &[ExportEntry], config: &ExportConfig) -> Result<Ve
     let by_name: HashMap<String, usize> = places.into_iter().map(|(_, name)| name).zip(parts).collect();
     let part =
         |entry: &ExportEntry| if is_unseen(entry) { 2 } else { by_name.get(&group(entry)).copied().unwrap_or(0) };
-    Ok(entries.iter().map(part).collect())
+    entries.iter().map(part).collect()
 }
 
 /// The tool, the pair's name and the finger, in characters that no glob and no `splitext` interprets.
@@ -120,23 +117,18 @@ mod tests {
     #[test]
     fn parts_depend_on_names_and_seed_only() {
         let list = entries(500);
-        let config = ExportConfig { val: 0.2, test: 0.1, ..ExportConfig::default() };
-        let here = parts(&list, &config).unwrap();
+        let config = ExportConfig::default();
+        let here = parts(&list, &config);
         let [train, val, test] = counts(&here);
-        assert!((650..750).contains(&train) && (160..240).contains(&val) && (70..130).contains(&test), "{train} {val}");
+        assert!((750..850).contains(&train) && (70..130).contains(&val) && (70..130).contains(&test), "{train} {val}");
         assert!(here.chunks(2).all(|p| p[0] == p[1]), "fingers of a pair stay together");
         let mut reversed = list.clone();
         reversed.reverse();
-        let mut back = parts(&reversed, &config).unwrap();
+        let mut back = parts(&reversed, &config);
         back.reverse();
         assert_eq!(back, here);
-        assert_eq!(parts(&list[..600], &config).unwrap(), here[..600], "what comes later changes nothing before");
-        assert_ne!(parts(&list, &ExportConfig { seed: 1, ..config.clone() }).unwrap(), here);
-        let unseen = ExportConfig { test_tools: vec!["pattern_01".into()], ..config };
-        let unseen_parts = parts(&list, &unseen).unwrap();
-        assert!(list.iter().zip(unseen_parts).all(|(e, p)| e.tool.as_deref() != Some("pattern_01") || p == 2));
-        assert!(parts(&list, &ExportConfig { val: 0.6, test: 0.4, ..ExportConfig::default() }).is_err());
-        assert!(parts(&list, &ExportConfig { val: f64::NAN, ..ExportConfig::default() }).is_err());
+        assert_eq!(parts(&list[..600], &config), here[..600], "what comes later changes nothing before");
+        assert_ne!(parts(&list, &ExportConfig { seed: 1, ..config.clone() }), here);
     }
 
     #[test]
@@ -144,22 +136,22 @@ mod tests {
         for n in 3..12 {
             for seed in 0..40 {
                 let config = ExportConfig { seed, ..ExportConfig::default() };
-                let counts = counts(&parts(&entries(n), &config).unwrap());
+                let counts = counts(&parts(&entries(n), &config));
                 assert!(counts.iter().all(|&n| n > 0), "{n} pairs, seed {seed}: {counts:?}");
             }
         }
-        assert_eq!(counts(&parts(&entries(1), &ExportConfig::default()).unwrap()).iter().sum::<usize>(), 2);
+        assert_eq!(counts(&parts(&entries(1), &ExportConfig::default())).iter().sum::<usize>(), 2);
     }
 
     #[test]
     fn what_is_held_out_never_trains_and_tools_stay_together() {
         let mut list = entries(200);
         list.iter_mut().take(100).for_each(|entry| entry.held_out = true);
-        let out = parts(&list, &ExportConfig::default()).unwrap();
+        let out = parts(&list, &ExportConfig::default());
         assert!(out[..100].iter().all(|&p| p == 2) && out[100..].contains(&0));
         let asked = ExportConfig { held_out_in_train: true, ..ExportConfig::default() };
-        assert!(parts(&list, &asked).unwrap()[..100].contains(&0));
-        let by_tool = parts(&list[100..], &ExportConfig { by_tool: true, ..ExportConfig::default() }).unwrap();
+        assert!(parts(&list, &asked)[..100].contains(&0));
+        let by_tool = parts(&list[100..], &ExportConfig { by_tool: true, ..ExportConfig::default() });
         let of = |tool: &str| {
             let mine = list[100..].iter().zip(&by_tool).filter(|(e, _)| e.tool.as_deref() == Some(tool));
             mine.map(|(_, part)| *part).collect::<BTreeSet<_>>()

@@ -393,7 +393,7 @@ fn width(spans: impl Iterator<Item = [f32; 2]>) -> f64 {
 
 fn finished(image: Image, range: f64) -> ImageScore {
     let Image { finger, prediction, truth, noise_free, mask_iou, features } = image;
-    let similar = |truth| ssim(&prediction, truth, SsimRange::Explicit(range)).ok().map(|found| found.mean);
+    let similar = |truth| ssim(&prediction, truth, SsimRange::Explicit(range)).ok();
     ImageScore {
         finger,
         ssim: truth.as_ref().and_then(similar),
