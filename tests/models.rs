@@ -189,10 +189,10 @@ mod running {
     use touch2touch_core::grid::{Grid, RgbGrid};
     use touch2touch_core::postprocess::{RawPrediction, ShiftMode};
     use touch2touch_pipeline::infer::bundle::Role;
-    use touch2touch_pipeline::infer::classifier::{ClassifyError, ToolClassifier, Verdict};
+    use touch2touch_pipeline::infer::classifier::{ToolClassifier, Verdict};
     use touch2touch_pipeline::infer::engine::{EngineChoice, Graph, Input, resolve};
     use touch2touch_pipeline::infer::generator::{GenerateError, Generator};
-    use touch2touch_pipeline::infer::mask::{MaskError, MaskModel};
+    use touch2touch_pipeline::infer::mask::{ImprintError, MaskModel};
 
     use super::*;
     use crate::support::left_out;
@@ -321,7 +321,7 @@ mod running {
         let generator = Bundle::open(&fixture("generator")).unwrap();
         let mask = Bundle::open(&fixture("mask")).unwrap();
         assert!(matches!(Generator::open(&mask, EngineChoice::Rten), Err(GenerateError::NotAGenerator(_))));
-        assert!(matches!(MaskModel::open(&generator, EngineChoice::Rten), Err(MaskError::NotAMaskUnet(_))));
+        assert!(matches!(MaskModel::open(&generator, EngineChoice::Rten), Err(ImprintError::NotAMaskUnet(_))));
         let mut model = Generator::open(&generator, EngineChoice::Rten).unwrap();
         for config in [
             GenerateConfig { steps: 0, ..config() },
@@ -362,7 +362,7 @@ mod running {
             let mask = model.predict(&large).unwrap();
             assert_eq!(mask, large.map(|&d| d > 0.005));
             let nothing = Grid::filled(18, 14, f32::NAN);
-            assert!(matches!(model.predict(&nothing), Err(MaskError::Nothing { .. })));
+            assert!(matches!(model.predict(&nothing), Err(ImprintError::Nothing { .. })));
         }
     }
 
@@ -387,10 +387,10 @@ mod running {
                 assert!(features.iter().zip([-0.6, -0.6, -0.6, 0.8]).all(|(a, b)| (a - b).abs() < 1e-5));
             }
             let nothing = Grid::filled(18, 14, f32::NAN);
-            assert!(matches!(model.classify(&[&nothing]), Err(ClassifyError::Nothing { .. })));
+            assert!(matches!(model.classify(&[&nothing]), Err(ImprintError::Nothing { .. })));
             assert!(model.classify(&[]).unwrap().is_empty());
             let mask = Bundle::open(&fixture("mask")).unwrap();
-            assert!(matches!(ToolClassifier::open(&mask, choice), Err(ClassifyError::NotAClassifier(_))));
+            assert!(matches!(ToolClassifier::open(&mask, choice), Err(ImprintError::NotAClassifier(_))));
         }
     }
 

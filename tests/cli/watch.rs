@@ -135,7 +135,7 @@ fn touches_are_posed_as_they_arrive_and_damaged_ones_do_not_stop_it() {
     assert_eq!((done["event"].as_str(), done["name"].as_str()), (Some("done"), Some("grasp_1")), "{done}");
     assert!(done["latency"]["total"].as_f64().unwrap() > 0.0 && done["latency"]["generate"].as_f64().unwrap() > 0.0);
     let json = result(&slow);
-    assert_eq!(json["recipe"]["steps"], 2);
+    assert_eq!(json["recipe"]["config"]["steps"], 2);
     assert!(json["error"].is_null());
     // Two steps say little about the angle, but the way to it is the whole one.
     assert!(json["pose"]["angle_deg"].is_number() || json["no_pose"].is_string(), "{json}");

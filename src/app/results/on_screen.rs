@@ -6,7 +6,7 @@ use super::super::results;
 use super::super::state::State;
 use super::super::state::workbench::Layer;
 use touch2touch_core::rig::PadId;
-use touch2touch_pipeline::masks::propose::{CadAt, Takes};
+use touch2touch_pipeline::masks::propose::ProposalSource;
 
 /// The need of the cloud of an imprint: true where the 3D views and what lies beside them need it (with its pose), and
 /// whether it is needed at all.
@@ -27,7 +27,7 @@ pub fn proposes(state: &State) -> bool {
 /// True where the proposal needs the pose of an imprint.
 pub(crate) fn proposes_at_pose(state: &State, source: ImprintSource) -> bool {
     proposes(state)
-        && state.settings.mask.proposal.takes() == Takes::CadModel(CadAt::Registered)
+        && state.settings.mask.proposal == ProposalSource::CadRegistered
         && results::worked_on(state, state.selection.finger) == source
 }
 

@@ -15,7 +15,7 @@ use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::label::CadPose;
 use touch2touch_core::rig::PadId;
 use touch2touch_pipeline::error::TaskError;
-use touch2touch_pipeline::masks::propose::{self, CadAt, Proposal, Takes, hand_pose};
+use touch2touch_pipeline::masks::propose::{self, Proposal, ProposalSource, hand_pose};
 use touch2touch_pipeline::steps::on_pad::OnPad;
 
 const WHAT: &str = "Propose a mask";
@@ -85,9 +85,9 @@ impl Computes for ProposalKey {
 pub fn proposal_key(state: &State, source: ImprintSource, finger: PadId) -> Result<Option<ProposalKey>, Absent> {
     let imprint = results::imprint_key(state, source, finger)?;
     let within = Bits::from(state.settings.mask.choice.cad_distance_m);
-    let of = match state.settings.mask.proposal.takes() {
-        Takes::AutomaticMask => ProposalInputs::Automatic(results::mask_recipe(state, finger)?),
-        Takes::CadModel(CadAt::Truth) => {
+    let of = match state.settings.mask.proposal {
+        ProposalSource::Automatic => ProposalInputs::Automatic(results::mask_recipe(state, finger)?),
+        ProposalSource::CadTruth => {
             results::tool_name(state)?;
             let sample = results::sample(state).ready();
             if sample.is_some_and(|sample| sample.grasp_from_object.is_none()) {
@@ -95,17 +95,17 @@ pub fn proposal_key(state: &State, source: ImprintSource, finger: PadId) -> Resu
             }
             ProposalInputs::Cad(CadPlace::Truth, within)
         }
-        Takes::CadModel(CadAt::Registered) => match results::pose_key(state, source)? {
+        ProposalSource::CadRegistered => match results::pose_key(state, source)? {
             Some(key) => ProposalInputs::Cad(CadPlace::Registered(Box::new(key)), within),
             None => return Ok(None),
         },
-        Takes::CadModel(CadAt::Hand) => {
+        ProposalSource::CadHand => {
             results::tool_name(state)?;
             let held = state.workbench.hand(source).map(|hand| hand.pose);
             let pose = hand_pose(held, results::accepted(state, source)).ok_or(Absent::NoHandPose)?;
             ProposalInputs::Cad(CadPlace::hand(pose), within)
         }
-        Takes::DrawnMask => {
+        ProposalSource::Grow => {
             let hand = results::drawn_mask(state, source, finger).filter(|hand| hand.marks.has_hand_work());
             ProposalInputs::Grow(hand.ok_or(Absent::NoStrokes)?.revision)
         }

@@ -83,7 +83,14 @@ impl<'a> Worker<'a> {
 
     /// Everything the result depends on besides the touch.
     pub(super) fn recipe(&self, tool: Option<&str>, labels: &PairLabels) -> anyhow::Result<Value> {
-        told(&self.recipe, tool, labels)
+        let generating = self.recipe.generating()?;
+        let (recipe, masks) = (&self.recipe, labels.masks.iter().filter(|_| self.recipe.hand));
+        let drawn: Vec<(String, String)> =
+            masks.map(|(place, hand)| (format!("{place:?}"), digest(&hand.mask))).collect();
+        Ok(json!({
+            "id": recipe.id(Stage::Pose), "bundle": generating.bundle.name, "config": generating.config,
+            "runtime": resolve(recipe.engine)?, "drawn": drawn, "tool": tool, "version": env!("CARGO_PKG_VERSION"),
+        }))
     }
 
     /// Predicts, poses and writes. `None` if the run was told to stop meanwhile.
@@ -161,27 +168,6 @@ impl<'a> Worker<'a> {
         };
         Ok((name.to_owned(), model))
     }
-}
-
-/// Everything the result depends on besides the touch.
-fn told(recipe: &Recipe, tool: Option<&str>, labels: &PairLabels) -> anyhow::Result<Value> {
-    let generating = recipe.generating()?;
-    let (bundle, config) = (generating.bundle, generating.config);
-    let model = recipe.mask_model.as_ref().map(|model| &model.id);
-    let drawn: Vec<(String, String)> = labels
-        .masks
-        .iter()
-        .filter(|_| recipe.hand)
-        .map(|(place, hand)| (format!("{place:?}"), digest(&hand.mask)))
-        .collect();
-    let mask = json!({"choice": recipe.mask, "model": model.map(|id| &**id), "drawn": drawn});
-    Ok(json!({
-        "id": recipe.id(Stage::Pose),
-        "bundle": bundle.name, "bundle_hash": *bundle.id, "runtime": resolve(recipe.engine)?,
-        "sampler": config.sampler, "steps": config.steps, "seed": config.seed, "eta": config.eta,
-        "spacing": config.spacing, "guidance": config.guidance, "shift": recipe.shift, "mask": mask,
-        "registration": recipe.registration, "tool": tool, "version": env!("CARGO_PKG_VERSION"),
-    }))
 }
 
 /// Tells one drawn mask from another.

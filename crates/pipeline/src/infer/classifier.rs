@@ -1,33 +1,12 @@
 //! [`ToolClassifier`]: an imprint to the tool that made it, with the graph of a bundle.
 
 use super::bundle::{Bundle, ClassifierInput, ClassifierSpec, Role};
-use super::engine::{EngineChoice, EngineError, EngineKind, Graph, Input};
+use super::engine::{EngineChoice, EngineKind, Graph, Input};
+use super::mask::ImprintError;
 use super::sandbox::admit;
-use touch2touch_core::diffusion::{ModelError, Tensor};
+use touch2touch_core::diffusion::Tensor;
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::resample::bilinear;
-
-/// Why there is no verdict.
-#[derive(Debug, thiserror::Error)]
-pub enum ClassifyError {
-    /// The bundle is of another kind.
-    #[error("the bundle \"{0}\" is not a tool classifier; choose one whose manifest says kind \"tool_classifier\"")]
-    NotAClassifier(String),
-    /// No engine, or it does not take the graph.
-    #[error(transparent)]
-    Engine(#[from] EngineError),
-    /// The graph failed.
-    #[error(transparent)]
-    Model(#[from] ModelError),
-    /// An imprint without pixels, or without a single measured one.
-    #[error("the imprint of {width} x {height} pixels holds no measurement")]
-    Nothing {
-        /// Columns.
-        width: usize,
-        /// Rows.
-        height: usize,
-    },
-}
 
 /// Verdict of a classifier on one imprint.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,9 +31,9 @@ impl ToolClassifier {
     /// Loads the graph of a checked bundle.
     ///
     /// # Errors
-    /// [`ClassifyError::NotAClassifier`] and [`ClassifyError::Engine`].
-    pub fn open(bundle: &Bundle, choice: EngineChoice) -> Result<Self, ClassifyError> {
-        let not = || ClassifyError::NotAClassifier(bundle.name().to_owned());
+    /// [`ImprintError::NotAClassifier`] and [`ImprintError::Engine`].
+    pub fn open(bundle: &Bundle, choice: EngineChoice) -> Result<Self, ImprintError> {
+        let not = || ImprintError::NotAClassifier(bundle.name().to_owned());
         let spec = bundle.tool_classifier().ok_or_else(not)?.clone();
         let engine = admit(bundle, choice)?;
         let graph = Graph::load(engine, Role::ToolClassifier, bundle.file(Role::ToolClassifier).ok_or_else(not)?)?;
@@ -76,8 +55,8 @@ impl ToolClassifier {
     /// Pixels without measurement (NaN) are given to the graph as 0 m.
     ///
     /// # Errors
-    /// See [`ClassifyError`].
-    pub fn classify(&mut self, imprints: &[&DepthMap]) -> Result<Vec<Verdict>, ClassifyError> {
+    /// See [`ImprintError`].
+    pub fn classify(&mut self, imprints: &[&DepthMap]) -> Result<Vec<Verdict>, ImprintError> {
         if imprints.is_empty() {
             return Ok(Vec::new());
         }
@@ -85,7 +64,7 @@ impl ToolClassifier {
         let mut data = Vec::with_capacity(imprints.len() * width * height);
         for imprint in imprints {
             if imprint.as_slice().iter().all(|v| !v.is_finite()) {
-                return Err(ClassifyError::Nothing { width: imprint.width(), height: imprint.height() });
+                return Err(ImprintError::Nothing { width: imprint.width(), height: imprint.height() });
             }
             prepare(imprint, &self.spec.input, &mut data);
         }

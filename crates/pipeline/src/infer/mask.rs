@@ -8,12 +8,15 @@ use touch2touch_core::diffusion::{ModelError, Tensor};
 use touch2touch_core::grid::{DepthMap, Grid, Mask};
 use touch2touch_core::resample::{bilinear, nearest_mask};
 
-/// Why there is no mask.
+/// Why a model of imprints gives no answer.
 #[derive(Debug, thiserror::Error)]
-pub enum MaskError {
+pub enum ImprintError {
     /// The bundle is of another kind.
     #[error("the bundle \"{0}\" is not a mask UNet; choose one whose manifest says kind \"mask_unet\"")]
     NotAMaskUnet(String),
+    /// The bundle is of another kind.
+    #[error("the bundle \"{0}\" is not a tool classifier; choose one whose manifest says kind \"tool_classifier\"")]
+    NotAClassifier(String),
     /// No engine, or it does not take the graph.
     #[error(transparent)]
     Engine(#[from] EngineError),
@@ -43,9 +46,9 @@ impl MaskModel {
     /// Loads the graph of a checked bundle.
     ///
     /// # Errors
-    /// [`MaskError::NotAMaskUnet`] and [`MaskError::Engine`].
-    pub fn open(bundle: &Bundle, choice: EngineChoice) -> Result<Self, MaskError> {
-        let not = || MaskError::NotAMaskUnet(bundle.name().to_owned());
+    /// [`ImprintError::NotAMaskUnet`] and [`ImprintError::Engine`].
+    pub fn open(bundle: &Bundle, choice: EngineChoice) -> Result<Self, ImprintError> {
+        let not = || ImprintError::NotAMaskUnet(bundle.name().to_owned());
         let spec = bundle.mask_unet().ok_or_else(not)?.clone();
         let engine = admit(bundle, choice)?;
         let graph = Graph::load(engine, Role::MaskUnet, bundle.file(Role::MaskUnet).ok_or_else(not)?)?;
@@ -71,8 +74,8 @@ impl MaskModel {
     /// ([`settled_model`]): pixels of at least the given probability, or of the bundle's own.
     ///
     /// # Errors
-    /// See [`MaskError`].
-    pub fn contact(&mut self, imprint: &DepthMap, probability: Option<f32>) -> Result<ContactMask, MaskError> {
+    /// See [`ImprintError`].
+    pub fn contact(&mut self, imprint: &DepthMap, probability: Option<f32>) -> Result<ContactMask, ImprintError> {
         let least = probability.unwrap_or(self.least_probability());
         Ok(contact_of(&self.probability(imprint)?, imprint, least))
     }
@@ -82,8 +85,8 @@ impl MaskModel {
     /// Pixels without measurement (NaN) are given to the graph as 0 m.
     ///
     /// # Errors
-    /// See [`MaskError`].
-    pub fn predict(&mut self, imprint: &DepthMap) -> Result<Mask, MaskError> {
+    /// See [`ImprintError`].
+    pub fn predict(&mut self, imprint: &DepthMap) -> Result<Mask, ImprintError> {
         let least = self.least_probability();
         Ok(at_least(&self.probability(imprint)?, imprint, least))
     }
@@ -96,10 +99,10 @@ impl MaskModel {
     /// The probability of contact of each pixel, at the graph's size and in the raw orientation.
     ///
     /// # Errors
-    /// See [`MaskError`].
-    pub fn probability(&mut self, imprint: &DepthMap) -> Result<Grid<f32>, MaskError> {
+    /// See [`ImprintError`].
+    pub fn probability(&mut self, imprint: &DepthMap) -> Result<Grid<f32>, ImprintError> {
         if imprint.as_slice().iter().all(|v| !v.is_finite()) {
-            return Err(MaskError::Nothing { width: imprint.width(), height: imprint.height() });
+            return Err(ImprintError::Nothing { width: imprint.width(), height: imprint.height() });
         }
         let [width, height] = self.spec.input.size;
         let input = prepare(imprint, &self.spec.input);

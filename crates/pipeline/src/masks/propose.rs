@@ -3,8 +3,6 @@
 //! Masks by threshold, share and mask model are those of [`crate::steps::mask`]; what comes here takes more than the imprint: a
 //! pose, strokes.
 
-mod touch;
-
 use std::borrow::Cow;
 use std::sync::Arc;
 
@@ -12,9 +10,13 @@ use serde::{Deserialize, Serialize};
 use strum::{EnumIter, EnumString, IntoStaticStr};
 
 use crate::error::TaskError;
-use crate::labels::{DrawnMask, ImprintSource};
+use crate::job::JobCx;
+use crate::labels::{DrawnMask, ImprintSource, MaskPlace};
+use crate::steps::estimate::{Estimate, Touch};
 use crate::steps::mask::MaskRecipe;
+use crate::steps::models::Models;
 use crate::steps::on_pad::OnPad;
+use crate::steps::recipe::{Recipe, Stage};
 use touch2touch_core::cloud::CloudError;
 use touch2touch_core::contact::{ContactMask, signed_distances, without_grain};
 use touch2touch_core::frames::PlanarPose;
@@ -24,8 +26,6 @@ use touch2touch_core::manual::AcceptedPose;
 use touch2touch_core::pose::ToolModel;
 use touch2touch_core::rig::{PadId, Rig};
 use touch2touch_core::sample::{DepthCamera, PadTouch, Sample};
-
-pub use touch::{Proposals, ProposeSetup, propose};
 
 const WHAT: &str = "Propose a mask";
 
@@ -83,48 +83,89 @@ impl ProposalSource {
         }
     }
 
-    /// Base that a proposal of it is made from.
-    pub fn takes(self) -> Takes {
-        match self {
-            Self::Automatic => Takes::AutomaticMask,
-            Self::CadTruth => Takes::CadModel(CadAt::Truth),
-            Self::CadRegistered => Takes::CadModel(CadAt::Registered),
-            Self::CadHand => Takes::CadModel(CadAt::Hand),
-            Self::Grow => Takes::DrawnMask,
-        }
-    }
-
     /// It measures the distance to the CAD model.
     pub fn is_cad(self) -> bool {
-        matches!(self.takes(), Takes::CadModel(_))
+        matches!(self, Self::CadTruth | Self::CadRegistered | Self::CadHand)
     }
-}
-
-/// Base of a proposal, besides the imprint. Each has one function that makes it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Takes {
-    /// The mask of the automatic source: [`automatic`].
-    AutomaticMask,
-    /// The distances to the CAD model at a pose ([`cad_distances`]): [`near_cad`].
-    CadModel(CadAt),
-    /// The mask that a person drew on the imprint: [`grown`].
-    DrawnMask,
-}
-
-/// Pose of the CAD model.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum CadAt {
-    /// At the true pose.
-    Truth,
-    /// At the pose that is registered from the masks in force.
-    Registered,
-    /// At the pose at which a hand holds it, else at which one put it: [`hand_pose`].
-    Hand,
 }
 
 /// The pose by hand of an imprint: the one that is held, else the accepted one, if a person set that.
 pub fn hand_pose(held: Option<PlanarPose>, accepted: Option<AcceptedPose>) -> Option<PlanarPose> {
     held.or(accepted.filter(|accepted| accepted.by_hand).map(|accepted| accepted.pose))
+}
+
+/// Source of proposals, with its numbers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ProposeSetup {
+    /// The source.
+    pub source: ProposalSource,
+    /// The imprint that masks are proposed for, the automatic mask and the one in force, the distance to the CAD model, and
+    /// what registers the pose of [`ProposalSource::CadRegistered`].
+    pub recipe: Recipe,
+    /// The pose of [`ProposalSource::CadHand`]; `None` takes the one accepted for the pair, if a person set it.
+    pub pose: Option<PlanarPose>,
+}
+
+/// Proposals for some pads, or reasons why there are none.
+pub type Proposals = Vec<(PadId, Result<Proposal, TaskError>)>;
+
+/// Proposals for each of `pads`; `estimate` has the imprints of the touch by the recipe of `setup`.
+///
+/// # Errors
+/// The reason that holds for all of them: what the source lacks.
+pub fn propose(
+    touch: Touch<'_>,
+    estimate: &Estimate,
+    pads: &[PadId],
+    setup: &ProposeSetup,
+    models: &Models,
+) -> Result<Proposals, TaskError> {
+    let lacks = |why: &str| TaskError::new(WHAT, why);
+    let (sample, labels, imprints, of) = (touch.sample, touch.labels, &estimate.imprints, setup.recipe.imprint_of());
+    let reach = |recipe: &Recipe, stage| estimate.again(recipe).reach(touch, stage, models, &JobCx::unwatched());
+    let each = |make: &dyn Fn(PadId, &DepthMap) -> Result<Proposal, TaskError>| {
+        let one = |pad: PadId| {
+            let imprint = imprints[pad].as_ref().ok_or_else(|| lacks("there is no imprint"));
+            (pad, imprint.and_then(|imprint| make(pad, imprint)))
+        };
+        Ok(pads.iter().copied().map(one).collect())
+    };
+    let near = |at: CadPose, pose: PlanarPose| {
+        let tool = touch.tool.map_err(Clone::clone)?;
+        each(&|pad, imprint| {
+            let distances = cad_distances(imprint, setup.recipe.imprint, OnPad { sample, pad }, tool, pose)?;
+            Ok(near_cad(&distances, setup.recipe.mask.cad_distance_m, at))
+        })
+    };
+    match setup.source {
+        ProposalSource::Automatic => {
+            let made = reach(&Recipe { hand: false, ..setup.recipe.clone() }, Stage::Mask)?;
+            let made = made.contact();
+            each(&|pad, _| {
+                let one = made.masks[pad].as_ref().ok_or_else(|| lacks("there is no mask"))?;
+                Ok(automatic(one.clone(), &made.recipe, made.model.as_deref().unwrap_or_default()))
+            })
+        }
+        ProposalSource::CadTruth => {
+            let truth = sample.grasp_from_object.ok_or_else(|| lacks("the true pose of this pair is not known"))?;
+            near(CadPose::Truth, truth)
+        }
+        ProposalSource::CadRegistered => {
+            let estimate = reach(&setup.recipe, Stage::Pose)?;
+            let found = estimate.pose().map_err(Clone::clone)?.grasp_from_object;
+            near(CadPose::Registered(found), found)
+        }
+        ProposalSource::CadHand => {
+            let pose = hand_pose(setup.pose, labels.accepted(&of)).ok_or_else(|| {
+                lacks("nobody set the pose of this pair by hand").with_hint("Set it first, or name it with --pose.")
+            })?;
+            near(CadPose::Nudged(pose), pose)
+        }
+        ProposalSource::Grow => each(&|pad, imprint| {
+            let place = MaskPlace { pad, of: of.clone() };
+            grown(imprint, labels.drawn(&place, imprint))
+        }),
+    }
 }
 
 /// A proposed mask.

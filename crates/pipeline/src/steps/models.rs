@@ -9,10 +9,10 @@ use strum::IntoEnumIterator as _;
 
 use crate::error::TaskError;
 use crate::infer::bundle::GeneratorSpec;
-use crate::infer::engine::{EngineChoice, resolve};
+use crate::infer::engine::{EngineChoice, EngineKind, resolve};
 use crate::infer::generator::{GenerateError, Generator, Item, Observer};
 use crate::infer::kept_key::{KeptKey, input_digest};
-use crate::infer::mask::{MaskError, MaskModel};
+use crate::infer::mask::{ImprintError, MaskModel};
 use crate::infer::store::Store;
 use crate::io::caught::caught;
 use crate::job::{JobCx, PreviewPicture};
@@ -86,6 +86,21 @@ struct OutputChains {
     fit: Option<Arc<Fitted>>,
     color: Option<ColorChain>,
     input: [usize; 2],
+}
+
+impl OutputChains {
+    fn prediction(
+        self,
+        raw: RawPrediction,
+        bundle: &BundleInfo,
+        engine: EngineKind,
+        seconds: f64,
+        kept: bool,
+    ) -> Prediction {
+        let Self { chains, fit, color, .. } = self;
+        let engine = engine.label().to_owned();
+        Prediction { raw, chains, fit, color, bundle: bundle.id.clone(), engine, seconds, kept }
+    }
 }
 
 fn output_chains_of(spec: &GeneratorSpec, fit: Option<&Arc<Fitted>>) -> OutputChains {
@@ -239,7 +254,7 @@ impl Models {
             }
         }
         let fresh: Vec<usize> = (0..wanted.len()).filter(|at| answers[*at].is_none()).collect();
-        let OutputChains { chains, fit, color, .. } = if fresh.is_empty() {
+        let outputs = if fresh.is_empty() {
             // Nothing has to be loaded to show what is there.
             self.outputs(bundle)?
         } else {
@@ -267,16 +282,7 @@ impl Models {
                 Ok::<_, TaskError>(outputs)
             })?
         };
-        let prediction = |(raw, seconds, kept)| Prediction {
-            raw,
-            chains: chains.clone(),
-            fit: fit.clone(),
-            color,
-            bundle: bundle.id.clone(),
-            engine: kind.label().to_owned(),
-            seconds,
-            kept,
-        };
+        let prediction = |(raw, seconds, kept)| outputs.clone().prediction(raw, bundle, kind, seconds, kept);
         Ok(answers.into_iter().flatten().map(prediction).collect())
     }
 
@@ -329,21 +335,12 @@ impl Models {
         // Oldest first: the last one is the one shown.
         for stored in found.into_iter().rev() {
             let Some(bundle) = by_id(bundles, &stored.recipe.bundle) else { continue };
-            let Ok(OutputChains { chains, fit, color, .. }) = self.outputs(bundle) else { continue };
+            let Ok(outputs) = self.outputs(bundle) else { continue };
             let engine = match stored.recipe.engine {
                 made if Some(made) == in_force => engine,
                 made => made.into(),
             };
-            let prediction = Prediction {
-                raw: stored.raw,
-                chains,
-                fit,
-                color,
-                bundle: bundle.id.clone(),
-                engine: stored.recipe.engine.label().to_owned(),
-                seconds: stored.seconds,
-                kept: true,
-            };
+            let prediction = outputs.prediction(stored.raw, bundle, stored.recipe.engine, stored.seconds, true);
             kept.push(KeptPrediction { engine, config: stored.recipe.config, prediction });
         }
         kept
@@ -381,7 +378,7 @@ impl Models {
         &self,
         bundle: &BundleInfo,
         engine: EngineChoice,
-        ask: impl FnOnce(&mut MaskModel) -> Result<T, MaskError> + Send,
+        ask: impl FnOnce(&mut MaskModel) -> Result<T, ImprintError> + Send,
     ) -> Result<T, TaskError> {
         outside_of_pools(|| {
             let mut loaded = lock(&self.mask_model);

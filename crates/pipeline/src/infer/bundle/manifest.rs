@@ -605,22 +605,27 @@ fn generator(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<B
     })))
 }
 
+/// Checks the picture that a model of imprints is given.
+fn check_imprint(sensor: &SensorSpec, size: &[usize; 2], range: DepthRange, turned: u32, problems: &mut Problems) {
+    if !sides(size) {
+        problems.add("input.size: out of range", SIDES);
+    }
+    if !range.is_valid() {
+        problems.add("input.range_m: empty", "give [smallest, largest] depth in meters");
+    }
+    if !turn(turned) {
+        problems.add("input.rotation_deg: not supported", TURNS);
+    }
+    if sensor.kind != SensorKind::Depth {
+        problems.add("input.sensor.kind: not depth", "contact and tools are found in imprints of a depth sensor");
+    }
+}
+
 fn mask(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<BundleSpec> {
     let input: Option<MaskInput> = section(keys, "input", problems);
     let output: Option<MaskOutput> = section(keys, "output", problems);
     if let Some(input) = &input {
-        if !sides(&input.size) {
-            problems.add("input.size: out of range", SIDES);
-        }
-        if !input.range_m.is_valid() {
-            problems.add("input.range_m: empty", "give [smallest, largest] depth in meters");
-        }
-        if !turn(input.rotation_deg) {
-            problems.add("input.rotation_deg: not supported", TURNS);
-        }
-        if input.sensor.kind != SensorKind::Depth {
-            problems.add("input.sensor.kind: not depth", "contact and tools are found in imprints of a depth sensor");
-        }
+        check_imprint(&input.sensor, &input.size, input.range_m, input.rotation_deg, problems);
     }
     if let Some(output) = &output {
         if !(1..=2).contains(&output.classes) {
@@ -637,18 +642,7 @@ fn classifier(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<
     let input: Option<ClassifierInput> = section(keys, "input", problems);
     let output: Option<ClassifierOutput> = section(keys, "output", problems);
     if let Some(input) = &input {
-        if !sides(&input.size) {
-            problems.add("input.size: out of range", SIDES);
-        }
-        if !input.range_m.is_valid() {
-            problems.add("input.range_m: empty", "give [smallest, largest] depth in meters");
-        }
-        if !turn(input.rotation_deg) {
-            problems.add("input.rotation_deg: not supported", TURNS);
-        }
-        if input.sensor.kind != SensorKind::Depth {
-            problems.add("input.sensor.kind: not depth", "contact and tools are found in imprints of a depth sensor");
-        }
+        check_imprint(&input.sensor, &input.size, input.range_m, input.rotation_deg, problems);
     }
     if let Some(output) = &output {
         let mut names: Vec<&String> = output.classes.iter().filter(|name| !name.is_empty()).collect();
