@@ -19,18 +19,21 @@ use touch2touch_core::grid::Grid;
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::still::space::{InSpace, SpaceView};
 
+/// Picture of a pair, or why there is none.
+type Still = Result<Grid<[u8; 4]>, TaskError>;
+
 /// The renderer of stills, on the best graphics device that there is; a software one will do.
 ///
 /// # Errors
 /// If there is no device, or the program was built without a renderer.
-pub fn stills() -> Result<impl Fn(&InSpace, &SpaceView) -> Result<Grid<[u8; 4]>, TaskError>, TaskError> {
+pub fn stills() -> Result<impl Fn(&InSpace, &SpaceView) -> Still, TaskError> {
     #[cfg(feature = "gui")]
     {
         let stills = still::Stills::new()?;
         Ok(move |pair: &InSpace, view: &SpaceView| stills.draw(pair, view))
     }
     #[cfg(not(feature = "gui"))]
-    Err::<fn(&InSpace, &SpaceView) -> Result<Grid<[u8; 4]>, TaskError>, _>(
+    Err::<fn(&InSpace, &SpaceView) -> Still, _>(
         TaskError::new("3D picture", "this program was built without the 3D renderer")
             .with_hint("Build it with the feature gui."),
     )

@@ -71,7 +71,6 @@ pub struct Runtime {
     retry_at: Option<Instant>,
     /// Folders that labels were kept in so far: each such job is one of its own.
     kept: usize,
-    threaded: bool,
 }
 
 impl Runtime {
@@ -100,7 +99,6 @@ impl Runtime {
             cancels: BTreeMap::new(),
             retry_at: None,
             kept: 0,
-            threaded,
         }
     }
 

@@ -44,9 +44,7 @@ use touch2touch_core::units;
 use touch2touch_pipeline::steps::cloud::Clouds;
 use touch2touch_pipeline::still::space::ViewAngles;
 
-pub(crate) use build::{SceneMesh, guides, model_edges, parts, update_mesh};
-pub(crate) use layers::outline;
-pub(crate) use legend::distances;
+pub(crate) use build::SceneMesh;
 pub(crate) use overlay::{error_color, pose_details, pose_time};
 
 /// Height of the row above the views, points.
