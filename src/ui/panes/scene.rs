@@ -17,7 +17,7 @@ use eframe::egui::{self, Button, Color32, Rect, RichText, Ui, UiBuilder, vec2};
 use glam::{DAffine3, DVec3};
 use strum::IntoEnumIterator as _;
 
-use build::{SceneCloud, SceneSurface};
+use build::{SceneCloud, SceneMesh, SceneSurface};
 use gizmo::Gizmo;
 use layers::LayerColors;
 use steps::StepLines;
@@ -44,7 +44,6 @@ use touch2touch_core::units;
 use touch2touch_pipeline::steps::cloud::Clouds;
 use touch2touch_pipeline::still::space::ViewAngles;
 
-pub(crate) use build::SceneMesh;
 pub(crate) use overlay::{error_color, pose_details, pose_time};
 
 /// Height of the row above the views, points.

@@ -529,7 +529,6 @@ draws! {
 pub(super) fn command() -> impl Strategy<Value = Command> {
     let ways = vec![
         (6, library().boxed()),
-        (1, follow().boxed()),
         (6, view().boxed()),
         (4, predict().boxed()),
         (36, labels().boxed()),
@@ -546,7 +545,7 @@ pub(super) fn command() -> impl Strategy<Value = Command> {
     Union::new_weighted(ways).prop_map(|command: Command| {
         // A room that is not among the ways above does not compile.
         match command {
-            Command::Library(_) | Command::Follow(_) | Command::View(_) | Command::Predict(_) => {}
+            Command::Library(_) | Command::View(_) | Command::Predict(_) => {}
             Command::Labels(_)
             | Command::Inspect(_)
             | Command::Workbench(_)
