@@ -4,7 +4,7 @@
 //!   `&State`. [`keys`] are the plain values that results are kept under.
 //! * [`command::Command`] is what can happen to it, by room; [`apply::apply`] is the only writer and is pure:
 //!   work and files come out as [`effect::Effect`]s.
-//! * A room is a feature ([`library`], [`view`], [`predict`], [`labels`], [`inspect`],
+//! * A room is a feature ([`library`], [`follow`], [`view`], [`predict`], [`labels`], [`inspect`],
 //!   [`workbench`], [`evaluate`], [`export`], [`adapt`], [`train`], [`settings`], [`tasks`]): its file has its commands
 //!   and what they do.
 //! * [`recipe`] is what the settings say, with the models that are there; [`results`] says how each result is computed and
@@ -26,6 +26,7 @@ pub mod doctor;
 pub mod effect;
 pub mod evaluate;
 pub mod export;
+pub mod follow;
 pub mod inspect;
 pub mod jobs;
 pub mod keys;

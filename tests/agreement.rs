@@ -70,6 +70,7 @@ fn how(action: Action) -> How {
     match action {
         A::OpenFolder | A::OpenDemo | A::Reload => Verb(&["doctor", "demo"]),
         A::AboutData => Verb(&["doctor", "demo"]),
+        A::Follow => Verb(&["watch", "folder"]),
         // Labels are on the disk as soon as a verb ends.
         A::Save => Shell,
         A::ExportMeasured => Verb(&["export", "demo", "--pair", "a", "--out", "folder"]),

@@ -15,6 +15,7 @@ mod compare;
 mod daily;
 mod doctor;
 mod export;
+mod follow;
 mod frames;
 mod generate;
 mod inspect;

@@ -4,8 +4,9 @@ use strum::IntoEnumIterator;
 
 use super::action::{Action, actions};
 use super::command::{
-    CameraPreset, Command, DoctorCommand, EvaluateCommand, ExportCommand, InspectCommand, LabelsCommand, LearnCommand,
-    LibraryCommand, Pane, PredictCommand, SettingsCommand, TasksCommand, UiRequest, ViewCommand, WorkbenchCommand,
+    CameraPreset, Command, DoctorCommand, EvaluateCommand, ExportCommand, FollowCommand, InspectCommand, LabelsCommand,
+    LearnCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand, TasksCommand, UiRequest, ViewCommand,
+    WorkbenchCommand,
 };
 use super::keys::{ImprintSource, ShiftMode};
 use super::learn::{self, Network};
@@ -122,6 +123,11 @@ fn swap_membrane(look: &mut SceneLook) {
     let surface = LayerLook { shown: !surface.shown, ..surface };
     look.set(SceneLayer::Surface, surface);
     look.set(SceneLayer::Membrane, points);
+}
+
+fn follow(state: &State) -> Option<Command> {
+    let folder = state.library.open.as_ref().is_some_and(|open| open.source.root().is_some());
+    when(folder, FollowCommand::Set(state.library.follow.is_none()))
 }
 
 /// Takes the last corner of the open polygon back, or else the last change of what is on screen.

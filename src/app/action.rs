@@ -57,6 +57,8 @@ macro_rules! actions {
             _ => ui(UiRequest::PickFolder);
         OpenDemo, File, "Open the demo", "Opens the built-in simulated data", [],
             _ => does(LibraryCommand::Open(Place::Demo));
+        Follow, File, "Follow the folder", "Shows and predicts each new touch in the open folder; again to stop", [ctrl_shift(K::F)],
+            state => follow(state);
         Reload, File, "Reload", "Reads the open data set again", [plain(K::F5)],
             state => opened(state, LibraryCommand::Reload);
         AboutData, File, "About this data", "What is in this data set, how well the models do on it, and what would help", [],
@@ -411,6 +413,7 @@ impl Action {
         let text = match self {
             Self::OpenFolder => "load directory data dataset browse file",
             Self::OpenDemo => "example sample simulated simulator",
+            Self::Follow => "live watch camera stream",
             Self::Reload => "refresh again",
             Self::AboutData => "doctor facts summary info problems what is own",
             Self::ExportMasks => "unet training labels png save",

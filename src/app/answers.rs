@@ -6,13 +6,14 @@ use std::sync::Arc;
 use super::effect::{Effect, Ended, NotSaved};
 use super::jobs::Lane;
 use super::keys::{DatasetSeq, Preview, Revision};
+use super::source::Followed;
 use super::state::State;
 use super::state::labels::Merged;
 use super::state::learn::Network;
 use super::state::results::{Computed, Request};
 use super::state::settings::Settings;
 use super::state::tasks::{Level, TaskKind, Ticket};
-use super::{labels, library, results, settings, tasks, workbench};
+use super::{follow, labels, library, results, settings, tasks, workbench};
 use touch2touch_pipeline::error::{TaskError, TaskErrorKind};
 use touch2touch_pipeline::job::Progress;
 use touch2touch_pipeline::steps::bundles::BundleInfo;
@@ -20,6 +21,8 @@ use touch2touch_pipeline::steps::bundles::BundleInfo;
 /// An answer of the runtime.
 #[derive(Clone, Debug)]
 pub enum Answer {
+    /// A touch arrived in the followed folder.
+    Followed(DatasetSeq, Followed),
     /// Bundles were looked for.
     Bundles(Vec<BundleInfo>, Vec<TaskError>),
     /// The settings file was read.
@@ -54,6 +57,10 @@ pub enum Answer {
 
 pub(super) fn step(state: &mut State, answer: Answer, effects: &mut Vec<Effect>) {
     match answer {
+        Answer::Followed(seq, followed) => {
+            let current = state.library.is_open(seq);
+            follow::arrived(state, followed, current, effects);
+        }
         Answer::Bundles(bundles, problems) => {
             library::found(state, bundles, problems);
         }
@@ -110,7 +117,14 @@ fn ended(state: &mut State, ticket: Ticket, end: &Ended, effects: &mut Vec<Effec
     if end.kind.lane() == Lane::Batch && task.is_none_or(|task| task.outdated) {
         return;
     }
+    let before = state.library.open.as_ref().map(|open| (open.seq, open.place.clone()));
     end.land(state, effects);
+    if let Some(open) = &state.library.open
+        && before.as_ref().is_none_or(|(seq, _)| *seq != open.seq)
+    {
+        let again = before.is_some_and(|(_, place)| place == open.place);
+        follow::opened(state, again, effects);
+    }
 }
 
 /// The rooms' reaction to a result that is there now.

@@ -4,7 +4,8 @@ use super::command::{Command, rooms};
 use super::effect::Effect;
 use super::state::State;
 use super::{
-    answers, doctor, evaluate, export, inspect, labels, learn, library, predict, settings, tasks, view, workbench,
+    answers, doctor, evaluate, export, follow, inspect, labels, learn, library, predict, settings, tasks, view,
+    workbench,
 };
 use touch2touch_pipeline::labels::progress::Progress;
 

@@ -4,6 +4,7 @@ pub use super::answers::Answer;
 pub use super::doctor::DoctorCommand;
 pub use super::evaluate::EvaluateCommand;
 pub use super::export::ExportCommand;
+pub use super::follow::FollowCommand;
 pub use super::inspect::InspectCommand;
 pub use super::labels::{LabelsCommand, UnsavedCommand};
 pub use super::learn::LearnCommand;
@@ -23,6 +24,8 @@ macro_rules! rooms {
         $with! {
             /// To the data set, its list, and which pair is looked at.
             Library(LibraryCommand) in library,
+            /// To following a folder.
+            Follow(FollowCommand) in follow,
             /// To what is on screen.
             View(ViewCommand) in view,
             /// To predictions.

@@ -140,6 +140,8 @@ pub enum Effect {
     Start(Ticket, Started),
     /// Tell it to stop.
     Cancel(Ticket),
+    /// Follow the folder of a data set, or none any more.
+    Follow(Option<(DatasetSeq, Arc<dyn DataSource>)>),
     /// Look for bundles.
     FindBundles(Vec<PathBuf>),
     /// Write the labels of a pair; a newer request for the same pair replaces a waiting one.

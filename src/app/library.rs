@@ -1,7 +1,7 @@
 //! The room of the open data set and its list.
 
 pub(crate) use super::state::library::OpenDataset;
-pub use super::state::library::{Library, Place, Sort, short_name};
+pub use super::state::library::{Follow, Library, Place, Sort, short_name};
 
 use std::ops::Range;
 use std::sync::Arc;

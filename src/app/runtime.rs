@@ -1,5 +1,6 @@
 //! [`Runtime`]: turns effects and requests into jobs on lanes, and their answers into commands.
 
+mod follow;
 mod lanes;
 mod perform;
 
@@ -47,6 +48,8 @@ pub(super) enum JobId {
     SaveSettings,
     /// Looking for bundles.
     Bundles,
+    /// Following a folder.
+    Follow,
     /// Showing a folder.
     Reveal,
     /// Writing labels to another folder.
@@ -67,6 +70,7 @@ pub struct Runtime {
     preview_request: Arc<std::sync::Mutex<PreviewRequest>>,
     wake: Wake,
     cancels: BTreeMap<Ticket, Cancel>,
+    follower: Option<follow::FollowTask>,
     /// When labels that could not be written are tried again.
     retry_at: Option<Instant>,
     /// Folders that labels were kept in so far: each such job is one of its own.
@@ -97,6 +101,7 @@ impl Runtime {
             preview_request: Arc::default(),
             wake,
             cancels: BTreeMap::new(),
+            follower: None,
             retry_at: None,
             kept: 0,
         }
@@ -117,6 +122,7 @@ impl Runtime {
     /// Returns what only the window can do. Cheap when there is nothing to do.
     pub fn tick(&mut self, state: &mut State, commands: Vec<Command>) -> Vec<UiRequest> {
         let mut ui = Vec::new();
+        self.poll_follower();
         while let Ok(Event { id, answer }) = self.events.try_recv() {
             if let JobId::Task(ticket) = &id {
                 self.cancels.remove(ticket);
@@ -177,6 +183,7 @@ impl Runtime {
     /// Ends: waits for the files that are being written, and has labels that could not be written wait for the next opening
     /// of their data set. Call [`Runtime::tick`] no more.
     pub fn finish(&mut self, state: &mut State) {
+        self.follow(None);
         self.lanes.close();
         let mut keep: Vec<Effect> = Vec::new();
         while let Ok(Event { answer, .. }) = self.events.try_recv() {
@@ -233,6 +240,7 @@ impl Drop for Runtime {
         for cancel in self.cancels.values() {
             cancel.cancel();
         }
+        self.follow(None);
         self.lanes.close();
     }
 }

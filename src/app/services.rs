@@ -10,7 +10,7 @@ use std::sync::{Arc, LazyLock};
 use std::time::Duration;
 
 use super::keys::{PredictionKey, TouchKey};
-pub use super::source::DataSource;
+pub use super::source::{DataSource, Followed};
 use super::state::labels::Review;
 use super::state::library::Place;
 use super::state::settings::Settings;

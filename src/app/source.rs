@@ -10,6 +10,7 @@ use touch2touch_core::rig::Rig;
 use touch2touch_core::sample::Sample;
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::export::{ExportChoice, Plan};
+use touch2touch_pipeline::follow::Following;
 use touch2touch_pipeline::io::dataset::{Dataset, ToolUnit};
 use touch2touch_pipeline::job::JobCx;
 use touch2touch_pipeline::labels::{JournalHistory, Operation, PairLabels, Unsaved};
@@ -65,6 +66,16 @@ pub trait DataSource: Send + Sync {
         }
     }
 
+    /// Follows its folder for touches that appear; `None` for a source without a folder.
+    fn follow(&self) -> Option<Following> {
+        None
+    }
+
+    /// Itself with a data set that grew while it was followed: known pairs keep their ids, and what was labeled stays known.
+    fn grown(&self, _dataset: &Arc<Dataset>) -> Option<Arc<dyn DataSource>> {
+        None
+    }
+
     /// Reads the labels stored for a pair; empty if there are none.
     ///
     /// # Errors
@@ -109,4 +120,23 @@ pub trait DataSource: Send + Sync {
         folder: &Path,
         cx: &JobCx,
     ) -> Result<String, TaskError>;
+}
+
+/// A touch that arrived in a followed folder.
+#[derive(Clone)]
+pub struct Followed {
+    /// The data set with all pairs so far: those known before keep their ids.
+    pub source: Arc<dyn DataSource>,
+    /// The touch.
+    pub pair: PairId,
+    /// True where it was there before, and only its bubble came later.
+    pub completed: bool,
+    /// The tensors, or why they cannot be read.
+    pub sample: Result<Arc<Sample>, TaskError>,
+}
+
+impl std::fmt::Debug for Followed {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Followed({:?}, whole: {})", self.pair, self.sample.is_ok())
+    }
 }

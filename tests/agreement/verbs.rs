@@ -35,7 +35,10 @@ fn held(verb: &str) -> Option<Held> {
             python::a_random_recipe_gives_the_same_poses_from_python_and_by_the_verb,
         ]),
         "stats" => By(&[tables::statistics_of_a_random_recipe_are_the_same_by_button_and_verb_and_shift_the_same]),
-        "watch" => By(&[watched::what_lies_in_a_folder_is_watched_to_the_numbers_that_the_studio_shows]),
+        "watch" => By(&[
+            watched::what_lies_in_a_folder_is_watched_to_the_numbers_that_the_studio_shows,
+            watched::what_arrives_is_followed_by_the_studio_to_the_numbers_that_watch_writes,
+        ]),
         "evaluate" => By(&[recipes::a_random_recipe_gives_the_same_results_table_in_the_studio_and_by_the_verb]),
         "export" => By(&[
             files::a_random_recipe_exports_the_same_files_by_button_and_verb,

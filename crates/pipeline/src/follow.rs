@@ -1,4 +1,5 @@
-//! [`Following`]: touches that appear in a folder, one by one, each as soon as its files are whole; for `watch`.
+//! [`Following`]: touches that appear in a folder, one by one, each as soon as its files are whole; for the studio and for
+//! `watch`.
 //!
 //! The folder is polled, every [`PERIOD`]: unlike the system's notifications, that also sees what another machine writes
 //! to a network folder. A poll asks for the time of change of a handful of folders; names are read again when one of
@@ -147,7 +148,21 @@ impl Following {
         let io = |source| OpenError::Io { path: path.to_owned(), source };
         let path = path.canonicalize().map_err(io)?;
         drop(std::fs::read_dir(&path).map_err(io)?);
-        let mut following = Self {
+        let mut following = Self::of(path, existing);
+        following.scan(Instant::now(), true);
+        Ok(following)
+    }
+
+    /// Follows the folder of an open data set, whose pairs keep their ids; `None` for one without a folder.
+    pub fn continuing(dataset: Arc<Dataset>) -> Option<Self> {
+        let mut following = Self::of(dataset.root.clone()?, false);
+        following.dataset = Some(dataset);
+        following.enter(Instant::now(), true);
+        Some(following)
+    }
+
+    fn of(path: PathBuf, existing: bool) -> Self {
+        Self {
             path,
             dataset: None,
             existing,
@@ -160,9 +175,7 @@ impl Following {
             troubles: Vec::new(),
             said: Vec::new(),
             unsaid: VecDeque::new(),
-        };
-        following.scan(Instant::now(), true);
-        Ok(following)
+        }
     }
 
     /// The data set as far as it is known, known pairs with their ids; `None` while the folder holds none.
@@ -176,7 +189,7 @@ impl Following {
     }
 
     /// The next thing that happened; `None` if there is nothing until the next [`PERIOD`].
-    fn poll(&mut self) -> Option<FollowEvent> {
+    pub fn poll(&mut self) -> Option<FollowEvent> {
         let said = self.unsaid.pop_front();
         if said.is_some() {
             return said;

@@ -24,6 +24,7 @@ impl Runtime {
             Effect::Ui(request) => ui.push(request),
             Effect::Start(ticket, started) => self.start_task(ticket, started),
             Effect::Cancel(ticket) => self.cancel(ticket),
+            Effect::Follow(of) => self.follow(of),
             Effect::FindBundles(folders) => self.find_bundles(folders),
             Effect::SaveLabels(source, save) => self.save_labels(source, *save),
             Effect::KeepLabels { source, unsaved, folder, revisions } => {

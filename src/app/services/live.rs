@@ -25,6 +25,7 @@ use touch2touch_core::sample::Sample;
 use touch2touch_pipeline::doubts;
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::export::{self, DrawnMasks, ExportChoice, ExportSetup, Plan};
+use touch2touch_pipeline::follow::Following;
 use touch2touch_pipeline::infer::engine::EngineChoice;
 use touch2touch_pipeline::infer::store::{self, Store};
 use touch2touch_pipeline::io::dataset::Dataset;
@@ -158,6 +159,21 @@ impl DataSource for LiveSource {
 
     fn tool_mesh(&self, tool: &str) -> Result<TriMesh, TaskError> {
         Ok(tool_file(&self.dataset, tool)?.mesh)
+    }
+
+    fn follow(&self) -> Option<Following> {
+        Following::continuing(self.dataset.clone())
+    }
+
+    fn grown(&self, dataset: &Arc<Dataset>) -> Option<Arc<dyn DataSource>> {
+        Some(Arc::new(Self {
+            dataset: dataset.clone(),
+            labels: self.labels.continued(dataset),
+            problems: dataset.problems.clone(),
+            reviews: self.reviews.clone(),
+            waiting: self.waiting.clone(),
+            recovered: Recovered::default(),
+        }))
     }
 
     fn load_labels(&self, name: &str) -> Result<PairLabels, TaskError> {

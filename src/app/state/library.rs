@@ -97,6 +97,17 @@ impl OpenDataset {
     }
 }
 
+/// A folder that is followed.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Follow {
+    /// Touches that arrived.
+    pub arrived: usize,
+    /// Files among them that could not be read.
+    pub broken: usize,
+    /// The name of the newest.
+    pub newest: Option<String>,
+}
+
 /// The open data set and its list.
 #[derive(Clone, Debug, Default)]
 pub struct Library {
@@ -108,6 +119,8 @@ pub struct Library {
     pub failure: Option<TaskError>,
     /// The number of the last opening.
     pub last_seq: DatasetSeq,
+    /// The arrivals in the folder while it is followed; `None` while it is not.
+    pub follow: Option<Follow>,
     /// Shows only pairs whose name, tool or note contains every word (any case). `tool:`, `is:` and `note:` narrow a word;
     /// `has:note` are pairs with one; `angle>5` is a condition on a score.
     pub filter: String,

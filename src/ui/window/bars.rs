@@ -75,8 +75,10 @@ fn open_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
             Action::TrainMasks,
             Action::Save,
             Action::Reload,
+            Action::Follow,
         ] {
-            cx.menu_row(ui, action, false);
+            let on = action == Action::Follow && cx.state.library.follow.is_some();
+            cx.menu_row(ui, action, on);
         }
     });
     response.on_hover_text("Open a data set, export masks, train on them");
@@ -171,6 +173,7 @@ pub(crate) fn bottom(cx: &mut Cx<'_>, ui: &mut Ui, frame_ms: f32) {
             ui.add_space(12.0);
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 frame_time(cx, ui, frame_ms);
+                following(cx, ui);
                 jobs(cx, ui);
                 ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
                     let (text, color) = match &cx.shared.readout {
@@ -239,6 +242,22 @@ fn job(cx: &mut Cx<'_>, ui: &mut Ui, ticket: Ticket, task: &Task) {
     let text = if task.cancelling { "stopping…" } else { &task.progress.text };
     progress::bar(ui, 150.0, task.progress.fraction(), text);
     ui.label(RichText::new(&task.title).size(12.0).color(cx.p.text));
+}
+
+/// That the folder is followed, what arrived, and a way to stop it.
+fn following(cx: &mut Cx<'_>, ui: &mut Ui) {
+    let Some(follow) = &cx.state.library.follow else { return };
+    let mut text = format!("Following: {} arrived", follow.arrived);
+    if follow.broken > 0 {
+        text += &format!(", {} unreadable", follow.broken);
+    }
+    let newest = follow.newest.as_ref().map_or(String::new(), |name| format!("Newest: {name}. "));
+    let text = RichText::new(text).size(12.0).color(cx.p.accent);
+    let button = ui.add(egui::Button::new(text).min_size(vec2(0.0, 20.0))).accessible_name("Stop following");
+    if button.on_hover_text(Action::Follow.behind(&format!("{newest}Stops following the folder"))).clicked() {
+        cx.act(Action::Follow);
+    }
+    ui.add_space(8.0);
 }
 
 /// Time of a frame, in debug builds.

@@ -1,7 +1,13 @@
-//! A watched folder: what the studio shows of a touch, and what `watch` writes of it.
+//! A followed folder: what the studio shows of what arrives, and what `watch` writes of it.
 
+use std::time::{Duration, Instant};
+
+use touch2touch::app::command::FollowCommand;
+use touch2touch_core::catalog;
 use touch2touch_core::postprocess::Stats;
+use touch2touch_core::sim::{SimConfig, random_grasp, simulate};
 use touch2touch_pipeline::io::pt::Tensor;
+use touch2touch_pipeline::io::simulated::{Layout, write_pair};
 use touch2touch_pipeline::steps::mask::MaskSource;
 use touch2touch_pipeline::steps::recipe::Stage;
 
@@ -105,4 +111,39 @@ pub(in crate::agreement) fn what_lies_in_a_folder_is_watched_to_the_numbers_that
         counts.push(count);
     }
     compared(&counts, 20_000);
+}
+
+#[test]
+pub(in crate::agreement) fn what_arrives_is_followed_by_the_studio_to_the_numbers_that_watch_writes() {
+    let home = tempfile::tempdir().unwrap();
+    let mut draws = Draws::new(17);
+    let folder = lab_folder(home.path());
+    let mut both = Both::open(Place::Path(folder.clone()), home.path());
+    both.show(&[Pane::Predicted, Pane::Masks, Pane::Compare, Pane::Metrics, Pane::Scene]);
+    let mut recipe = draws.posed();
+    recipe.mask.source = MaskSource::TopPercent;
+    put(&mut both.studio, &recipe);
+    both.studio.send(FollowCommand::Set(true).into());
+    let tool = catalog::tools().iter().find(|tool| tool.name == "pattern_36").unwrap();
+    let sample = simulate(tool, random_grasp(40), 40, &SimConfig::default());
+    write_pair(&folder, Layout::Test, &tool.name, 40, &sample).unwrap();
+    let begin = Instant::now();
+    while both.studio.state.library.follow.as_ref().is_none_or(|follow| follow.arrived == 0) {
+        assert!(begin.elapsed() < Duration::from_secs(60), "nothing arrives: {:?}", both.studio.state.log.entries);
+        std::thread::sleep(Duration::from_millis(10));
+        let Studio { state, runtime } = &mut both.studio;
+        runtime.tick(state, Vec::new());
+    }
+    // Until it is predicted and posed.
+    both.studio.send(ViewCommand::ShowBothFingers(true).into());
+    assert!(both.studio.state.pair_name().ends_with("data_40"), "{}", both.studio.state.pair_name());
+    let out = both.at("watched");
+    let begin = ["watch", &both.path, "--once", "--out", &out].map(str::to_owned);
+    let words = recipe::in_force(&both.studio.state, ImprintSource::Predicted).words(Stage::Pose).list();
+    let all: Vec<&str> = begin.iter().chain(&words).map(String::as_str).chain(["--json"]).collect();
+    let lines = run(&all, &both.home);
+    assert!(lines.status.success(), "{recipe:?}: {}", String::from_utf8_lossy(&lines.stderr));
+    let found = results(Path::new(&out));
+    let (_, file) = found.iter().find(|(name, _)| name == both.studio.state.pair_name()).expect("it was watched");
+    compared(&[same_touch(&both, file, &format!("{recipe:?}"))], 20_000);
 }

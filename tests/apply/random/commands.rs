@@ -9,9 +9,9 @@ use proptest::sample::select;
 use proptest::strategy::Union;
 use strum::IntoEnumIterator;
 use touch2touch::app::command::{
-    Answer, CameraPreset, Command, DoctorCommand, EvaluateCommand, ExportCommand, Hover, InspectCommand, LabelsCommand,
-    LearnCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand, TasksCommand, UiRequest, UnsavedCommand,
-    ViewCommand, WorkbenchCommand,
+    Answer, CameraPreset, Command, DoctorCommand, EvaluateCommand, ExportCommand, FollowCommand, Hover, InspectCommand,
+    LabelsCommand, LearnCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand, TasksCommand, UiRequest,
+    UnsavedCommand, ViewCommand, WorkbenchCommand,
 };
 use touch2touch::app::doctor::{Examine, ReadOtherwise, TryModels};
 use touch2touch::app::effect::{Ended, LabelsToSave, NotSaved};
@@ -25,7 +25,7 @@ use touch2touch::app::labels::{PairLabels, Review, StrokeIn3d};
 use touch2touch::app::learn::{AdaptPairs, Learn, LearnForm, Learned, Network};
 use touch2touch::app::library::{Open, Place, ReadTool, Sort};
 use touch2touch::app::predict::{Generate, Refit};
-use touch2touch::app::services::Services as _;
+use touch2touch::app::services::{Followed, Services as _};
 use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{
     Change, ColorMap, ColorRange, GelView, GenerateSettings, Last, LayerLook, LayerSize, MaskChoice, MaskSettings,
@@ -296,6 +296,11 @@ fn evaluation() -> Evaluation {
 /// A number of an opening that never was.
 const NEVER: DatasetSeq = DatasetSeq(u32::MAX);
 
+fn followed() -> Followed {
+    let source = Double::new(false, true).source;
+    Followed { source, pair: PairId(0), completed: false, sample: Err(TaskError::new("Load", "it is half written")) }
+}
+
 /// The end of an errand of any kind, as empty as it can be. A kind that has none does not compile.
 fn ended() -> impl Strategy<Value = Ended> {
     (any_of::<TaskKind>(), select(vec!["tool_a/data_0", "elsewhere"]), select(vec![DatasetSeq(1), NEVER])).prop_map(
@@ -384,6 +389,9 @@ draws! {
         1 NextUnfinished,
         1 NextWorst,
         1 DoneAndNext,
+    }
+    follow: FollowCommand {
+        1 Set(any::<bool>()),
     }
     view: ViewCommand {
         3 SelectFinger(finger()),
@@ -504,6 +512,7 @@ draws! {
     }
     // Answers that nobody waits for, or that come too late.
     answers: Answer {
+        1 Followed(Just(NEVER), Just(()).prop_map(|()| followed())),
         1 Bundles(Just(()).prop_map(|()| Double::new(false, true).find_bundles(&[]).0), Just(Vec::new())),
         1 SettingsLoaded(mask().prop_map(|mask| Box::new(Settings { mask, ..Settings::default() })), Just(None)),
         1 Demanded(touch().prop_map(|touch| vec![Request::Sample(touch.pair)])),

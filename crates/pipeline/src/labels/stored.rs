@@ -45,6 +45,12 @@ impl Labels {
         Self { store: Arc::new(MaskStore::for_dataset(dataset)), saved: Arc::default() }
     }
 
+    /// Labels of a data set that grew: what was written since the opening stays known.
+    #[must_use]
+    pub fn continued(&self, dataset: &Dataset) -> Self {
+        Self { store: Arc::new(MaskStore::for_dataset(dataset)), saved: self.saved.clone() }
+    }
+
     /// The folder they lie in.
     ///
     /// # Errors
