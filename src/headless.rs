@@ -21,6 +21,7 @@ mod recipe;
 mod report;
 mod simulate;
 mod stats;
+mod still;
 mod version;
 mod watch;
 
@@ -79,6 +80,8 @@ enum Verb {
     Pose(pose::PoseArgs),
     /// Make the paper's results table of a data set: generators side by side, the measured imprints as the upper bound.
     Evaluate(Box<evaluate::EvaluateArgs>),
+    /// Draw a pair in 3D, as a PNG of any size, or as the frames of a turntable.
+    Still(Box<still::StillArgs>),
     /// Write a pair for other programs: its cloud (PLY), pose (JSON) and CAD model in the hand (STL).
     Export(Box<export::ExportArgs>),
     /// Fit a generator to pairs of your own sensors, and score it on pairs that were left out.
@@ -237,6 +240,7 @@ fn run(cli: Option<Cli>) -> VerbResult {
         Some(Verb::Watch(args)) => watch::run(&args),
         Some(Verb::Pose(args)) => pose::run(&args),
         Some(Verb::Evaluate(args)) => evaluate::run(&args),
+        Some(Verb::Still(args)) => still::run(&args),
         Some(Verb::Export(args)) => export::run(&args),
         Some(Verb::Adapt(args)) => adapt::run(&args),
         Some(Verb::Label(args)) => label::run(&args),

@@ -15,9 +15,8 @@ pub use focus::{FILLED, focus};
 #[cfg(feature = "gui")]
 mod focus;
 
-use touch2touch_core::grid::Grid;
 use touch2touch_pipeline::error::TaskError;
-use touch2touch_pipeline::still::space::{InSpace, SpaceView};
+use touch2touch_pipeline::still::space::{InSpace, SpacePicture, SpaceView};
 
 /// Picture of a pair, or why there is none.
 type Still = Result<Grid<[u8; 4]>, TaskError>;
@@ -26,14 +25,14 @@ type Still = Result<Grid<[u8; 4]>, TaskError>;
 ///
 /// # Errors
 /// If there is no device, or the program was built without a renderer.
-pub fn stills() -> Result<impl Fn(&InSpace, &SpaceView) -> Still, TaskError> {
+pub fn stills() -> Result<impl Fn(&InSpace, &SpaceView) -> Result<SpacePicture, TaskError>, TaskError> {
     #[cfg(feature = "gui")]
     {
         let stills = still::Stills::new()?;
         Ok(move |pair: &InSpace, view: &SpaceView| stills.draw(pair, view))
     }
     #[cfg(not(feature = "gui"))]
-    Err::<fn(&InSpace, &SpaceView) -> Still, _>(
+    Err::<fn(&InSpace, &SpaceView) -> Result<SpacePicture, TaskError>, _>(
         TaskError::new("3D picture", "this program was built without the 3D renderer")
             .with_hint("Build it with the feature gui."),
     )

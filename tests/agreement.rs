@@ -7,6 +7,7 @@ mod proposals;
 mod python;
 mod random;
 mod recipes;
+mod stills;
 mod verbs;
 mod verdicts;
 

@@ -69,13 +69,15 @@ fn write(state: &mut State, output: Output, file: PathBuf, effects: &mut Vec<Eff
         Output::Still(asked) => {
             let Some((setup, open)) = still_setup(state, asked).zip(state.library.open.as_ref()) else { return };
             let source = open.source.clone();
-            let file = if file.extension().is_none() { file.with_extension("png") } else { file };
+            let png = asked.turntable.is_none() && file.extension().is_none();
+            let file = if png { file.with_extension("png") } else { file };
             let write = Write::new(Lane::Models, "Still", file, move |file, access, cx| {
                 let drawer = spatial::stills()?;
                 let dataset = source.on_disk("Still")?;
-                still(dataset, &setup, access.services.models(), drawer, &file, cx)?;
-                let px = setup.width_px;
-                Ok((format!("Saved {} ({px} x {px} pixels)", file.display()), file))
+                let done = still(dataset, &setup, access.services.models(), drawer, &file, cx)?;
+                let ([width, height], count) = (done.size_px, done.files.len());
+                let frames = if count == 1 { String::new() } else { format!("{count} frames of ") };
+                Ok((format!("Saved {} ({frames}{width} x {height} pixels)", file.display()), file))
             });
             tasks::start(state, "Draw the still", write, effects);
         }

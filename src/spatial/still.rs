@@ -15,7 +15,7 @@ use touch2touch_core::grid::Grid;
 use touch2touch_pipeline::compare::deviation::DISTANCE_MAP;
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::labels::ImprintSource;
-use touch2touch_pipeline::still::space::{Ground, InSpace, SpaceSide, SpaceView};
+use touch2touch_pipeline::still::space::{Ground, InSpace, SpacePicture, SpaceSide, SpaceView};
 
 /// The smaller side of a 3D pane on a screen, pixels: lines, dashes and points of a still are as wide in relation to it.
 const SCREEN_PX: f32 = 460.0;
@@ -213,11 +213,12 @@ impl Stills {
     ///
     /// # Errors
     /// If the device fails.
-    pub fn draw(&self, pair: &InSpace, view: &SpaceView) -> Result<Grid<[u8; 4]>, TaskError> {
+    pub fn draw(&self, pair: &InSpace, view: &SpaceView) -> Result<SpacePicture, TaskError> {
         let scene = scene(pair, view.ground, view.distance_m);
         let (yaw, pitch) = (view.angles.yaw_deg.to_radians(), view.angles.pitch_deg.to_radians());
         let mut camera = Camera { yaw_rad: yaw, pitch_rad: pitch, ..Camera::default() };
         camera.frame(&focus(&scene), FILLED);
+        camera.yaw_rad += view.turned_deg.to_radians();
         let drawn = self.picture(&scene, &camera, view.size_px);
         let drawn = drawn.map_err(|err| TaskError::new("3D picture", err.to_string()))?;
         let [width, height] = drawn.size.map(|n| n as usize);
@@ -227,7 +228,8 @@ impl Stills {
             [own(at[0]), own(at[1]), own(at[2]), at[3]]
         };
         let pixels = drawn.rgba.chunks_exact(4).map(pixel).collect();
-        Grid::from_vec(width, height, pixels).map_err(|err| TaskError::from_error("3D picture", &err))
+        let pixels = Grid::from_vec(width, height, pixels).map_err(|err| TaskError::from_error("3D picture", &err))?;
+        Ok(SpacePicture { pixels, px_per_m: camera.px_per_m(view.size_px) })
     }
 }
 

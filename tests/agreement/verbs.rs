@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::random::{files, labels, posed, tables, watched};
-use super::{exchange, python, recipes};
+use super::{exchange, python, recipes, stills};
 use crate::support::run;
 
 /// Comparison of a verb with the studio.
@@ -40,6 +40,7 @@ fn held(verb: &str) -> Option<Held> {
             watched::what_arrives_is_followed_by_the_studio_to_the_numbers_that_watch_writes,
         ]),
         "evaluate" => By(&[recipes::a_random_recipe_gives_the_same_results_table_in_the_studio_and_by_the_verb]),
+        "still" => By(&[stills::pictures_in_3d_are_the_same_files_in_both]),
         "export" => By(&[
             files::a_random_recipe_exports_the_same_files_by_button_and_verb,
             super::a_pair_in_files_is_the_same_in_both,

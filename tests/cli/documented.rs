@@ -42,6 +42,7 @@ static TABLE: &[(&str, How)] = &[
     ("touch2touch pose", How::Run(&[], "--limit 1", &[0])),
     // The first of the faults may well have no pose.
     ("touch2touch pose faults", How::Run(&[], "--limit 1", &[0, 1])),
+    ("touch2touch still", How::Run(&[("4", "1"), ("180", "2")], "--steps 1", &[0])),
     ("touch2touch export", How::Run(&[], "", &[0])),
     ("touch2touch label", How::Run(&[], "", &[0])),
     ("touch2touch masks export", How::Run(&[], "", &[0])),
@@ -93,6 +94,9 @@ impl Stage {
         store.save(&name, lab::RIGHT, Some(&stored)).unwrap();
         MaskStore::in_folder(dir.path().join("other")).save(&name, lab::RIGHT, Some(&stored)).unwrap();
         store.save_review(&name, &StoredReview { review: "done".into(), ..StoredReview::default() }).unwrap();
+        let (set, masks) = (set.to_str().unwrap(), dir.path().join("masks"));
+        let done = run(&["masks", "export", set, "--out", masks.to_str().unwrap()], dir.path());
+        assert!(done.status.success(), "{}", error_text(&done));
         let robot = dir.path().join("robot");
         std::fs::create_dir(&robot).unwrap();
         let touch = dataset.gelslim_file(id).unwrap();
@@ -111,6 +115,7 @@ impl Stage {
                 ("PATH", _) => at("set"),
                 ("NAME", _) => self.name.clone(),
                 ("OTHER", _) => at("other"),
+                ("MASKS", _) => at("masks"),
                 ("TOOL.stl", _) => at("set/tools_stls/pattern_36.stl"),
                 ("DIR", "--out") => at(&format!("out {number}")),
                 ("DIR", "watch") => at("robot"),
@@ -118,6 +123,7 @@ impl Stage {
                 ("FITTED", "--out") => at(&format!("fitted {number}")),
                 ("FITTED", _) => self.small_bundle.to_str().unwrap().to_owned(),
                 ("FILE" | "OUT" | "OUT.json" | "SHARDS" | "TABLE.csv", _) => at(&format!("{number} {word}")),
+                ("STILL.png", _) => at(&format!("{number} still.png")),
                 ("PY", _) => "/no/such/python".to_owned(),
                 (json, _) if json.starts_with("--json=") => format!("--json={}", at(&format!("{number} OUT.json"))),
                 (path, _) if path.starts_with("assets/") => repository().join(path).to_str().unwrap().to_owned(),

@@ -1,10 +1,13 @@
-//! Stills of a pair in 3D as PNG files ([`still`]).
+//! Stills of a pair in 3D as PNG files ([`still`]): one picture, or the frames of a turntable.
 
 pub mod space;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use serde::Serialize;
+
+use crate::compare::deviation::DISTANCES_M;
 use crate::error::TaskError;
 use crate::io::dataset::Dataset;
 use crate::io::images;
@@ -12,16 +15,16 @@ use crate::job::JobCx;
 use crate::labels::PairLabels;
 use crate::steps::models::Models;
 use crate::steps::recipe::Recipe;
-use space::{Ground, InSpace, SpaceInput, SpacePane, SpaceView, ViewAngles, in_space};
+use space::{Ground, InSpace, SpaceInput, SpacePane, SpacePicture, SpaceView, ViewAngles, in_space};
 use touch2touch_core::dataset::PairId;
-use touch2touch_core::grid::Grid;
 
 const WHAT: &str = "Still";
 /// Width of a still at scale 1, pixels; it is as high as it is wide.
 pub const WIDTH_PX: u32 = 960;
 /// Widths that can be asked for, pixels.
-const WIDTHS_PX: std::ops::RangeInclusive<u32> = 64..=8192;
-
+pub const WIDTHS_PX: std::ops::RangeInclusive<u32> = 64..=8192;
+/// Most frames of a turntable.
+pub const MOST_FRAMES: u32 = 3600;
 /// Content of a still.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StillSetup {
@@ -37,30 +40,65 @@ pub struct StillSetup {
     pub ground: Ground,
     /// Direction of the view.
     pub angles: ViewAngles,
-    /// Width and height, pixels.
+    /// Width and height, pixels, within [`WIDTHS_PX`].
     pub width_px: u32,
-    /// Distance at which the colors of signed distances end, meters; `None` without them.
+    /// Frames of a turntable, into a folder; `None` = one picture, into a file.
+    pub turntable: Option<u32>,
+    /// Distance at which the colors of signed distances end, meters, within [`DISTANCES_M`]; `None` without them.
     pub distance_m: Option<f64>,
 }
 
-/// Draws a pair and writes it as a PNG file.
+/// Stills that were written.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct StillFiles {
+    /// The files.
+    pub files: Vec<PathBuf>,
+    /// Width and height, pixels.
+    pub size_px: [u32; 2],
+    /// Pixels per millimeter in the plane of what one looks at.
+    pub px_per_mm: f64,
+    /// Words on how it was made, prediction, registration and pose.
+    pub note: String,
+}
+
+impl StillSetup {
+    /// Checks that it can be drawn.
+    ///
+    /// # Errors
+    /// The reason why it cannot, and what to do.
+    pub fn check(&self) -> Result<(), TaskError> {
+        let fail = |why: String, hint: &str| Err(TaskError::new(WHAT, why).with_hint(hint));
+        if !WIDTHS_PX.contains(&self.width_px) {
+            let (lo, hi) = (WIDTHS_PX.start(), WIDTHS_PX.end());
+            return fail(format!("{} pixels are no width", self.width_px), &format!("Choose {lo} to {hi} pixels."));
+        }
+        if self.turntable.is_some_and(|frames| frames == 0 || frames > MOST_FRAMES) {
+            return fail("a turntable of so many frames cannot be".into(), "Choose 1 to 3600 frames.");
+        }
+        if self.distance_m.is_some_and(|reach| !DISTANCES_M.contains(&reach)) {
+            return fail("the colors of distances cannot end there".into(), "Choose 0.01 to 50 mm.");
+        }
+        if !(self.angles.yaw_deg.is_finite() && self.angles.pitch_deg.abs() <= 90.0) {
+            return fail("the view is no direction".into(), "Choose two numbers, the second from -90 to 90 degrees.");
+        }
+        Ok(())
+    }
+}
+
+/// Draws a pair and writes it: a PNG file, or `frame_0001.png` and so on into a folder.
 ///
 /// # Errors
-/// If it cannot be drawn as large as asked, the pair cannot be read, its results cannot be made, the graphics device fails,
-/// or the job was told to stop.
+/// If it cannot be drawn as asked, the pair cannot be read, its results cannot be made, the graphics device fails, or the
+/// job was told to stop.
 pub fn still(
     dataset: &Dataset,
     setup: &StillSetup,
     models: &Models,
-    draw: impl Fn(&InSpace, &SpaceView) -> Result<Grid<[u8; 4]>, TaskError>,
-    file: &Path,
+    draw: impl Fn(&InSpace, &SpaceView) -> Result<SpacePicture, TaskError>,
+    out: &Path,
     cx: &JobCx,
-) -> Result<(), TaskError> {
-    if !WIDTHS_PX.contains(&setup.width_px) {
-        let (lo, hi) = (WIDTHS_PX.start(), WIDTHS_PX.end());
-        let why = format!("{} pixels are no width", setup.width_px);
-        return Err(TaskError::new(WHAT, why).with_hint(format!("Choose {lo} to {hi} pixels.")));
-    }
+) -> Result<StillFiles, TaskError> {
+    setup.check()?;
     let name = dataset.index.get(setup.pair).map_or_else(String::new, |entry| entry.name.clone());
     let sample = dataset
         .load(setup.pair)
@@ -68,21 +106,45 @@ pub fn still(
         .map_err(|err| TaskError::from_error(format!("{WHAT}: load {name}"), &err).with_hint(err.hint()))?;
     let input = SpaceInput { dataset, pair: setup.pair, recipe: &setup.recipe, labels: &setup.labels, models };
     let pair = in_space(input, &sample, setup.pane.sides(), setup.distance_m.is_some(), cx)?;
-    cx.check(WHAT)?;
-    let StillSetup { ground, angles, distance_m, .. } = *setup;
-    let pixels = draw(&pair, &SpaceView { ground, angles, distance_m, size_px: [setup.width_px; 2] })?;
-    images::write_rgba8(file, &pixels).map_err(|err| TaskError::new(WHAT, format!("{err} ({})", file.display())))
+    let frames = setup.turntable.unwrap_or(1);
+    if setup.turntable.is_some() {
+        std::fs::create_dir_all(out)
+            .map_err(|err| TaskError::new(WHAT, format!("cannot make the folder: {err} ({})", out.display())))?;
+    }
+    let size_px = [setup.width_px; 2];
+    let mut done = StillFiles { files: Vec::new(), size_px, px_per_mm: 0.0, note: pair.note.clone() };
+    for frame in 0..frames {
+        cx.check(WHAT)?;
+        cx.progress(u64::from(frame), u64::from(frames), name.clone());
+        let turned_deg = 360.0 * f64::from(frame) / f64::from(frames);
+        let StillSetup { pane, ground, angles, distance_m, .. } = *setup;
+        let view = SpaceView { pane, ground, angles, turned_deg, distance_m, size_px };
+        let picture = draw(&pair, &view)?;
+        done.px_per_mm = picture.px_per_m * 1e-3;
+        let file = match setup.turntable {
+            Some(_) => out.join(format!("frame_{:04}.png", frame + 1)),
+            None => out.to_owned(),
+        };
+        images::write_rgba8(&file, &picture.pixels)
+            .map_err(|err| TaskError::new(WHAT, format!("{err} ({})", file.display())))?;
+        done.files.push(file);
+    }
+    Ok(done)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::labels::ImprintSource;
+    use touch2touch_core::grid::Grid;
 
-    /// Draws nothing in the upper half.
-    fn plain(pair: &InSpace, view: &SpaceView) -> Result<Grid<[u8; 4]>, TaskError> {
+    /// Draws the share of the frame's turn as a color, and nothing in the upper half.
+    fn plain(pair: &InSpace, view: &SpaceView) -> Result<SpacePicture, TaskError> {
         assert!(pair.sides.iter().all(|side| side.pose.is_some() && !side.contact.is_empty()));
         let [w, h] = view.size_px.map(|n| n as usize);
-        Ok(Grid::from_fn(w, h, |_, y| if y < h / 2 { [0; 4] } else { [0, 200, 200, 255] }))
+        let color = (view.turned_deg / 360.0 * 255.0) as u8;
+        let pixels = Grid::from_fn(w, h, |_, y| if y < h / 2 { [0; 4] } else { [color, 200, 200, 255] });
+        Ok(SpacePicture { pixels, px_per_m: 10_000.0 })
     }
 
     fn setup() -> StillSetup {
@@ -100,6 +162,7 @@ mod tests {
             ground: Ground::Transparent,
             angles: ViewAngles::default(),
             width_px: 480,
+            turntable: None,
             distance_m: None,
         }
     }
@@ -109,16 +172,34 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let (demo, models) = (Dataset::demo(), Models::new(None));
         let file = folder.path().join("still.png");
-        still(&demo, &setup(), &models, plain, &file, &JobCx::unwatched()).unwrap();
+        let done = still(&demo, &setup(), &models, plain, &file, &JobCx::unwatched()).unwrap();
+        assert_eq!((done.size_px, done.px_per_mm), ([480, 480], 10.0));
+        assert!(done.note.starts_with(ImprintSource::Measured.key()) && done.note.contains("true"), "{}", done.note);
         let image = image::open(&file).unwrap().into_rgba8();
         assert_eq!(image.get_pixel(100, 50).0[3], 0, "nothing was drawn there");
         assert_eq!(image.get_pixel(360, 472).0, [0, 200, 200, 255]);
     }
 
     #[test]
+    fn a_turntable_is_numbered_frames_all_around() {
+        let folder = tempfile::tempdir().unwrap();
+        let setup = StillSetup { turntable: Some(4), width_px: 64, ..setup() };
+        let new = folder.path().join("frames");
+        let done = still(&Dataset::demo(), &setup, &Models::new(None), plain, &new, &JobCx::unwatched()).unwrap();
+        let colors = done.files.iter().map(|file| image::open(file).unwrap().into_rgba8().get_pixel(32, 40).0[0]);
+        assert_eq!(colors.collect::<Vec<_>>(), [0, 63, 127, 191]);
+        assert!(done.files[3].ends_with("frame_0004.png"));
+    }
+
+    #[test]
     fn what_cannot_be_drawn_is_refused_in_words() {
-        let broken = StillSetup { width_px: 20_000, ..setup() };
-        let made = still(&Dataset::demo(), &broken, &Models::new(None), plain, Path::new("x.png"), &JobCx::unwatched());
-        assert!(made.unwrap_err().hint.is_some());
+        for broken in [
+            StillSetup { width_px: 20_000, ..setup() },
+            StillSetup { turntable: Some(0), ..setup() },
+            StillSetup { distance_m: Some(f64::NAN), ..setup() },
+            StillSetup { angles: ViewAngles { yaw_deg: 0.0, pitch_deg: f64::NAN }, ..setup() },
+        ] {
+            assert!(broken.check().unwrap_err().hint.is_some());
+        }
     }
 }

@@ -69,6 +69,7 @@ pub(crate) fn still_setup(state: &State, asked: StillAsked) -> Option<StillSetup
         ground: asked.ground,
         angles: asked.angles,
         width_px: asked.width_px,
+        turntable: asked.turntable,
         distance_m: (state.workbench.layer == Layer::Distance).then_some(reach.into()),
     })
 }

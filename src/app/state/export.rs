@@ -24,12 +24,14 @@ pub struct StillAsked {
     pub ground: Ground,
     /// Direction of the view.
     pub angles: ViewAngles,
+    /// Frames of a turntable; `None` = one picture.
+    pub turntable: Option<u32>,
 }
 
 /// Something to be written once the place is chosen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Output {
-    /// A picture of the selected pair in 3D.
+    /// The selected pair in 3D: a picture, or a turntable into a folder.
     Still(StillAsked),
     /// Cloud, pose and mesh of an imprint of the selected pair, into a folder.
     Pair(ImprintSource),
@@ -41,7 +43,8 @@ impl Output {
     /// The request, as the title of a dialog.
     pub fn title(self) -> &'static str {
         match self {
-            Self::Still(_) => "Save the 3D picture (.png)",
+            Self::Still(StillAsked { turntable: None, .. }) => "Save the 3D picture (.png)",
+            Self::Still(_) => "Save the frames of a turntable to a folder",
             Self::Masks => "Export masks to a folder",
             Self::Pair(_) => "Export cloud, pose and mesh to a folder",
         }
@@ -50,6 +53,7 @@ impl Output {
     /// The name that a file is offered under; `None` where a folder is asked for.
     pub fn file_name(self) -> Option<String> {
         match self {
+            Self::Still(StillAsked { turntable: Some(_), .. }) => None,
             Self::Still(asked) => Some(format!("3d-{}.png", asked.pane.name().to_lowercase())),
             Self::Pair(_) | Self::Masks => None,
         }

@@ -255,6 +255,7 @@ mod tests {
             width_px: 960,
             ground: Ground::White,
             angles: ViewAngles::default(),
+            turntable: None,
         });
         assert!(output.file_name().is_some());
         let picture = Purpose::Output(output);

@@ -15,6 +15,9 @@ use crate::ui::parts::theme::caption;
 use touch2touch_pipeline::still::WIDTH_PX;
 use touch2touch_pipeline::still::space::Ground;
 
+/// Frames of a turntable: six seconds of a film.
+const FRAMES: u32 = 180;
+
 /// Pictures of a 3D view, by ground and size, from where the view looks now.
 fn stills(cx: &mut Cx<'_>, ui: &mut Ui) {
     let pane = cx.state.settings.scene_sides();
@@ -26,13 +29,19 @@ fn stills(cx: &mut Cx<'_>, ui: &mut Ui) {
         (Ground::Transparent, "no ground", "without ground"),
     ] {
         ui.horizontal(|ui| {
-            let asked = StillAsked { pane, width_px: WIDTH_PX, ground, angles };
+            let asked = StillAsked { pane, width_px: WIDTH_PX, ground, angles, turntable: None };
             let sizes = [(WIDTH_PX, "1x"), (2 * WIDTH_PX, "2x"), (4 * WIDTH_PX, "4x"), (8192, "8k")];
             let sizes = sizes.map(|(width_px, text)| (StillAsked { width_px, ..asked }, text));
-            for (asked, text) in sizes {
+            for (asked, text) in sizes.into_iter().chain([(StillAsked { turntable: Some(FRAMES), ..asked }, "film")]) {
                 let button = ui.add_enabled(export::can_draw(cx.state), egui::Button::new(text));
                 let button = button.accessible_name(format!("Save 3D picture {text} {on}"));
-                let tip = format!("Save as PNG, {0} x {0} pixels {on}, from this viewpoint", asked.width_px);
+                let size = format!("{} x {} pixels {on}", asked.width_px, asked.width_px);
+                let tip = match asked.turntable {
+                    None => format!("Save as PNG, {size}, from this viewpoint"),
+                    Some(frames) => {
+                        format!("Save one turn around the pair as {frames} PNG files, {size}")
+                    }
+                };
                 if button.on_hover_text(tip).clicked() {
                     cx.push(ExportCommand::Place(Output::Still(asked)));
                     ui.close();

@@ -258,10 +258,10 @@ fn mask_choice() -> impl Strategy<Value = ExportChoice> {
 }
 
 fn output() -> impl Strategy<Value = Output> {
-    let still = (any_of::<SpacePane>(), any::<u32>(), any_of::<Ground>(), any::<[f64; 2]>());
-    let still = still.prop_map(|(pane, width_px, ground, [yaw_deg, pitch_deg])| {
+    let still = (any_of::<SpacePane>(), any::<u32>(), any_of::<Ground>(), any::<[f64; 2]>(), any::<Option<u32>>());
+    let still = still.prop_map(|(pane, width_px, ground, [yaw_deg, pitch_deg], turntable)| {
         let angles = ViewAngles { yaw_deg, pitch_deg };
-        StillAsked { pane, width_px, ground, angles }
+        StillAsked { pane, width_px, ground, angles, turntable }
     });
     prop_oneof![Just(Output::Masks), source().prop_map(Output::Pair), still.prop_map(Output::Still),]
 }

@@ -14,14 +14,17 @@ use crate::labels::{ImprintSource, PairLabels};
 use crate::steps::estimate::{Touch, estimate};
 use crate::steps::models::Models;
 use crate::steps::pose::PoseResult;
+use crate::steps::prediction::predicted_by;
 use crate::steps::recipe::{Recipe, Stage};
 use crate::steps::tool::load_tool;
 use touch2touch_core::cloud::membrane;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::grid::Grid;
 use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::rig::{PerPad, Rig};
 use touch2touch_core::sample::Sample;
+use touch2touch_core::units;
 
 /// A column of 3D pictures: the imprints that it shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -91,14 +94,27 @@ impl Default for ViewAngles {
 /// View of a pair, for a renderer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpaceView {
+    /// The imprints shown.
+    pub pane: SpacePane,
     /// The ground.
     pub ground: Ground,
     /// Direction of the view.
     pub angles: ViewAngles,
+    /// Turn of the view about the vertical after it was framed, degrees.
+    pub turned_deg: f64,
     /// Distance at which the colors of signed distances end, meters; `None` where the model has its own color.
     pub distance_m: Option<f64>,
     /// Width and height, pixels.
     pub size_px: [u32; 2],
+}
+
+/// A picture by a renderer.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SpacePicture {
+    /// sRGB and opacity, not multiplied.
+    pub pixels: Grid<[u8; 4]>,
+    /// Pixels per meter in the plane of what one looks at.
+    pub px_per_m: f64,
 }
 
 /// An imprint of a pair in 3D: meters, grasp frame.
@@ -127,6 +143,8 @@ pub struct InSpace {
     pub truth: Option<PlanarPose>,
     /// The sensors.
     pub rig: Arc<Rig>,
+    /// Words on how it was made.
+    pub note: String,
 }
 
 /// A pair of a data set, with what its results depend on.
@@ -163,7 +181,7 @@ pub fn in_space(
         None => Err(TaskError::new(WHAT, "no tool is named")),
     };
     let touch = Touch { dataset, pair, sample, tool: tool.as_ref(), labels };
-    let mut made = Vec::new();
+    let (mut made, mut notes) = (Vec::new(), Vec::new());
     for &source in sides {
         let recipe = Recipe { imprint: source, ..recipe.clone() };
         let estimate = estimate(touch, &recipe, Stage::Pose, models, cx)?;
@@ -179,6 +197,7 @@ pub fn in_space(
         let pose = estimate.pose().ok().cloned();
         let apart = pose.as_ref().zip(tool.as_ref().ok()).filter(|_| distances);
         let deviation = apart.map(|(pose, tool)| deviation(&clouds, tool, pose.grasp_from_object));
+        notes.push(side_note(&recipe, pose.as_ref()));
         let contact = clouds.fingers.as_ref().map(|cloud| cloud.map(contact));
         made.push(SpaceSide { source, contact, membranes, pose, deviation });
     }
@@ -187,5 +206,27 @@ pub fn in_space(
         model: tool.ok().map(|tool| Arc::new(tool.mesh.clone())),
         truth: sample.grasp_from_object,
         rig: sample.rig.clone(),
+        note: notes.join(" · "),
     })
+}
+
+/// `measured 3.2° ± 0.5° (true 3.1°), joint`.
+fn side_note(recipe: &Recipe, pose: Option<&PoseResult>) -> String {
+    let mut text = recipe.imprint.key().to_owned();
+    match pose {
+        Some(pose) => {
+            text += &format!(" {}", pose.angle_text());
+            if let Some(truth) = pose.truth_rad {
+                text += &format!(" (true {})", units::text_deg(truth));
+            }
+            text += &format!(", {}", recipe.registration);
+        }
+        None => text += ": no pose",
+    }
+    match (&recipe.generator, recipe.imprint) {
+        (Some((bundle, config)), ImprintSource::Predicted) => {
+            format!("{text} · {}", predicted_by(&bundle.name, config, recipe.shift))
+        }
+        _ => text,
+    }
 }
