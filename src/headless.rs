@@ -5,6 +5,7 @@
 
 mod adapt;
 mod args;
+mod compare;
 mod contact_mask;
 mod doctor;
 mod evaluate;
@@ -69,6 +70,8 @@ enum Verb {
     Simulate(simulate::SimulateArgs),
     /// Predict Soft Bubble imprints from GelSlim images and compare them with the measured ones.
     Generate(generate::GenerateArgs),
+    /// Compare any two imprints of a pair: measured, predictions, the mean of several seeds, a stored picture.
+    Compare(Box<compare::CompareArgs>),
     /// Compute the depth statistics of a data set's predictions and measurements, for `--shift refit:FILE`.
     Stats(stats::StatsArgs),
     /// Follow a folder: predict and pose each GelSlim touch that appears, and write the result beside it.
@@ -236,6 +239,7 @@ fn run(cli: Option<Cli>) -> VerbResult {
         }
         Some(Verb::Simulate(args)) => simulate::run(&args),
         Some(Verb::Generate(args)) => generate::run(&args),
+        Some(Verb::Compare(args)) => compare::run(&args),
         Some(Verb::Stats(args)) => stats::run(&args),
         Some(Verb::Watch(args)) => watch::run(&args),
         Some(Verb::Pose(args)) => pose::run(&args),

@@ -31,7 +31,7 @@ use touch2touch::app::runtime::Runtime;
 use touch2touch::app::services::Services as _;
 use touch2touch::app::services::live::LiveServices;
 use touch2touch::app::settings::prefer;
-use touch2touch::app::settings::{MaskChoice, MaskSettings, MaskSource, MaskTool};
+use touch2touch::app::settings::{MaskChoice, MaskSettings, MaskSource, MaskTool, Versus, VersusMode};
 use touch2touch::app::state::{Lookup, State};
 use touch2touch::app::{export, results};
 use touch2touch_core::dataset::PairId;
@@ -39,6 +39,7 @@ use touch2touch_core::grid::Grid;
 use touch2touch_core::label::CleanKind;
 use touch2touch_core::postprocess::{CorrectionParts, ShiftMode};
 use touch2touch_core::rig::lab;
+use touch2touch_pipeline::compare::subject::Subject;
 use touch2touch_pipeline::doctor::{Cure, Fact};
 use touch2touch_pipeline::export::{ExportChoice, Which};
 use touch2touch_pipeline::infer::engine::EngineChoice;
@@ -130,7 +131,9 @@ fn how(action: Action) -> How {
         A::PoseTool | A::RevertHand | A::MeasureDistance | A::MeasureAngle => Window,
         A::NudgeLeft | A::NudgeRight | A::NudgeUp | A::NudgeDown | A::TurnLeft | A::TurnRight => Window,
         A::LockRange | A::RangeOnce | A::ResetRange | A::Fit | A::BothClouds | A::LinkCameras | A::Footprint => Window,
-        A::CompareMode | A::SwapCompared => Window,
+        A::CompareMode | A::SwapCompared => {
+            Options(&["compare", "demo", "--pair", "a", "--a", "prediction:seed=7", "--b", "measured"])
+        }
         A::WindowOnly | A::MembraneSurface | A::EyeDome | A::Parallel | A::CopyCamera => Window,
         A::CameraLeft | A::CameraRight | A::CameraFront | A::CameraBack | A::CameraTop | A::CameraBottom => Window,
         A::CameraOblique | A::NextSides | A::NextGel | A::SwitchTheme => Window,
@@ -327,6 +330,37 @@ fn on_the_demo_the_studio_says_what_the_verbs_say() {
     let home = tempfile::tempdir().unwrap();
     let found = assert_same(Place::Demo, "demo", home.path(), 2);
     assert_eq!((found.get("unet"), found.get("comparison")), (Some(&4), Some(&4)), "{found:?}");
+}
+
+#[test]
+fn two_predictions_are_compared_by_one_function() {
+    let home = tempfile::tempdir().unwrap();
+    let (a, b) = ("prediction:seed=7,shift=raw", "mean:seeds=2");
+    let mut studio = Studio::open(Place::Demo, home.path());
+    studio.send(ViewCommand::ShowPanes([Pane::Compare].into_iter().collect()).into());
+    let versus = Versus { a: a.parse().unwrap(), b: b.parse().unwrap(), mode: VersusMode::default() };
+    let shown = versus.clone();
+    studio.send(prefer(move |s| *s.versus_mut() = shown.clone()).into());
+    studio.send(LibraryCommand::Select(PairId(40)).into());
+    let state = &studio.state;
+    let report = json(&["compare", "demo", "--pair", state.pair_name(), "--a", a, "--b", b], home.path());
+    let fingers = report["fingers"].as_array().unwrap();
+    assert_eq!(fingers.len(), 2);
+    for (pad, finger) in state.rig().pads().zip(fingers) {
+        for (key, [one, other]) in [
+            ("a", [&versus.a, &Subject::Measured]),
+            ("b", [&versus.b, &Subject::Measured]),
+            ("a_b", [&versus.a, &versus.b]),
+        ] {
+            let found = results::subjects_compared(state, one, other, pad).ready().expect(key);
+            assert_eq!(finger[key]["psnr_db"], optional(found.psnr_db), "{key}");
+            assert_eq!(finger[key]["ssim"], optional(found.ssim), "{key}");
+        }
+    }
+    for (key, subject) in [("a_deg", &versus.a), ("b_deg", &versus.b)] {
+        let pose = results::subject_pose(state, subject).expect("a pose");
+        assert_eq!(report["poses"][key], number(pose.angle_rad.to_degrees()), "{key}");
+    }
 }
 
 #[test]

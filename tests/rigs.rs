@@ -180,6 +180,7 @@ fn verbs_refuse_a_spoilt_rig_and_the_doctor_names_it() {
         "stats --out OUT",
         "masks export --out OUT",
         "label",
+        "compare --pair a",
         "export --pair a --out OUT",
         "watch --once",
     ] {

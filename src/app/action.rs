@@ -274,7 +274,7 @@ macro_rules! actions {
             _ => does(prefer(|s| s.gel = next_of(&s.gel)));
         BothClouds, View, "Both clouds", "Shows measured and predicted points in each 3D view", [],
             state => does(WorkbenchCommand::SetBothClouds(!state.workbench.both_clouds));
-        CompareMode, View, "Next comparison", "Cycles through side by side, wipe and difference in Compare", [shift(K::F)],
+        CompareMode, View, "Next comparison", "Cycles through side by side, wipe, difference and 3D in Compare", [shift(K::F)],
             _ => does(prefer(|s| s.versus_mut().mode = next_of(&s.versus_mut().mode)));
         SwapCompared, View, "Swap A and B", "Swaps A and B in Compare", [shift(K::R)],
             _ => does(prefer(|s| *s.versus_mut() = s.versus_mut().clone().swapped()));

@@ -64,8 +64,8 @@ pub use shown::{chosen, imprint_key, shown, worked_on};
 pub(crate) use shown::{imprint_of, pick, picked};
 pub use tool::{tool, tool_name};
 pub(crate) use tool::{tool_key, want_tool};
-pub use versus::{comparison, subject, subject_key, subject_pose, subjects_compared};
-pub(crate) use versus::{want_comparison, want_versus};
+pub use versus::{comparison, subject, subject_key, subject_pose, subjects_apart, subjects_compared};
+pub(crate) use versus::{pose_absent, subject_points, want_comparison, want_versus};
 
 /// A key that says how its result is computed.
 pub(crate) trait Computes: Key {

@@ -1,6 +1,7 @@
 //! Random recipes over the demo, a lab folder and a folder of pictures: what the studio shows by one, and what the verb says
 //! with the words that the studio gives for it, number by number.
 
+pub(super) mod compared;
 pub(super) mod files;
 pub(super) mod labels;
 #[cfg(feature = "tune")]

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::random::{files, labels, posed, tables, watched};
+use super::random::{compared, files, labels, posed, tables, watched};
 use super::{exchange, python, recipes, stills};
 use crate::support::run;
 
@@ -33,6 +33,10 @@ fn held(verb: &str) -> Option<Held> {
             recipes::a_random_recipe_gives_the_same_numbers_in_the_studio_and_by_the_verbs,
             posed::every_step_of_a_registration_is_the_same_in_the_time_machine_and_by_the_verb,
             python::a_random_recipe_gives_the_same_poses_from_python_and_by_the_verb,
+        ]),
+        "compare" => By(&[
+            compared::any_two_imprints_differ_by_the_same_in_the_pane_and_by_the_verb,
+            super::two_predictions_are_compared_by_one_function,
         ]),
         "stats" => By(&[tables::statistics_of_a_random_recipe_are_the_same_by_button_and_verb_and_shift_the_same]),
         "watch" => By(&[

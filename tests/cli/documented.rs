@@ -36,6 +36,7 @@ static TABLE: &[(&str, How)] = &[
     ("touch2touch simulate --faults --out faults", How::Run(&[], "", &[0])),
     ("touch2touch generate", How::Run(&[], "--limit 1 --steps 1", &[0])),
     ("touch2touch watch", How::Run(&[], "--once --steps 1", &[0])),
+    ("touch2touch compare", How::Run(&[("seed=7,steps=50", "steps=2")], "--steps 1", &[0])),
     ("touch2touch stats", How::Run(&[], "--limit 1 --steps 1", &[0])),
     ("touch2touch evaluate", How::Run(&[("test-set", "PATH")], "--grasps 1 --steps 1 --resamples 0", &[0])),
     ("touch2touch adapt", How::Run(&[("50", "1"), ("5", "0.01")], "--limit 2 --steps 1", &[0])),

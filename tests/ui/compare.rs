@@ -1,4 +1,4 @@
-//! Any two imprints against each other: figures, pictures, the wipe, and that nothing is made out of sight.
+//! Any two imprints against each other: figures, pictures, the wipe, 3D, and that nothing is made out of sight.
 
 use eframe::egui::{Event, Key, Modifiers, PointerButton, Pos2, Rect, vec2};
 use egui_kittest::kittest::Queryable as _;
@@ -10,7 +10,7 @@ use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{Versus, VersusMode, Workspace};
 use touch2touch::app::state::State;
 use touch2touch_core::rig::lab;
-use touch2touch_pipeline::compare::subject::{RecipeChange, Subject};
+use touch2touch_pipeline::compare::subject::Subject;
 
 use super::rig::Rig;
 
@@ -38,12 +38,12 @@ fn pixels(rig: &mut Rig, rect: Rect) -> Vec<[u8; 4]> {
     image.enumerate_pixels().filter(|(x, y, _)| inside(*x, *y)).map(|(_, _, p)| p.0).collect()
 }
 
-fn seed(seed: u64) -> Subject {
-    Subject::Predicted(RecipeChange { seed: Some(seed), ..RecipeChange::default() })
+fn subject(text: &str) -> Subject {
+    text.parse().unwrap()
 }
 
-fn set(rig: &mut Rig, a: Subject, b: Subject, mode: VersusMode) {
-    let versus = Versus { a, b, mode };
+fn set(rig: &mut Rig, a: &str, b: &str, mode: VersusMode) {
+    let versus = Versus { a: subject(a), b: subject(b), mode };
     rig.send(prefer(move |s| *s.versus_mut() = versus.clone()));
     rig.settle();
 }
@@ -55,14 +55,14 @@ fn any_two_imprints_are_compared_where_somebody_looks() {
     rig.send(PredictCommand::Generate);
     // Behind a pane that fills the window nothing is made of what is wished there.
     rig.fill("Predicted imprint");
-    set(&mut rig, seed(7), Subject::Measured, VersusMode::Side);
+    set(&mut rig, "prediction:seed=7", "measured", VersusMode::Side);
     let made = |rig: &Rig| state(rig).results.made.values().map(Vec::len).sum::<usize>();
     assert!(!state(&rig).selection.panes.contains(&Pane::Compare));
     assert_eq!(made(&rig), 2, "one for each finger");
     let chosen = results::chosen(state(&rig), lab::RIGHT).cloned();
 
     click(&mut rig, "Back to all panes");
-    let (a, b) = (seed(7), Subject::Measured);
+    let (a, b) = (subject("prediction:seed=7"), Subject::Measured);
     assert_eq!(made(&rig), 4, "the wished ones, of both fingers: they make one pose");
     assert_eq!(results::chosen(state(&rig), lab::RIGHT).cloned(), chosen, "what the other panes show stays");
     let found = results::subjects_compared(state(&rig), &a, &b, lab::RIGHT).ready().expect("the figures");
@@ -76,7 +76,7 @@ fn any_two_imprints_are_compared_where_somebody_looks() {
     rig.shoot("compare-side");
 
     // The prediction on screen against the measurement is what the metrics say.
-    set(&mut rig, Subject::shown(), Subject::Measured, VersusMode::Difference);
+    set(&mut rig, "prediction", "measured", VersusMode::Difference);
     let state_now = state(&rig);
     let versus = results::subjects_compared(state_now, &Subject::shown(), &b, lab::RIGHT).ready().unwrap();
     let error = results::comparison(state_now, lab::RIGHT).ready().unwrap();
@@ -97,7 +97,7 @@ fn a_key_flickers_a_line_wipes_and_both_values_are_read() {
     let Some(mut rig) = Rig::new([1280.0, 800.0], 1) else { return };
     rig.send(prefer(|s| s.hint_dismissed = true));
     rig.send(PredictCommand::Generate);
-    set(&mut rig, Subject::shown(), Subject::Measured, VersusMode::Side);
+    set(&mut rig, "prediction", "measured", VersusMode::Side);
     // Large pictures: half a pixel beside is little of them.
     rig.fill("Compare");
     let place = rig.harness.get_by_label("Compare A right").rect();
@@ -157,18 +157,37 @@ fn a_key_flickers_a_line_wipes_and_both_values_are_read() {
 }
 
 #[test]
-fn the_choice_is_kept_per_workspace() {
+fn in_3d_both_clouds_or_their_distance_and_the_choice_is_kept_per_workspace() {
     let Some(mut rig) = Rig::new([1280.0, 800.0], 1) else { return };
     rig.send(prefer(|s| s.hint_dismissed = true));
-    set(&mut rig, seed(7), Subject::Measured, VersusMode::Side);
+    rig.send(PredictCommand::Generate);
+    set(&mut rig, "mean:seeds=2", "measured", VersusMode::Clouds);
+    assert!(rig.harness.query_by_label("3D view, A and B").is_some());
+    let (mean, measured) = (subject("mean:seeds=2"), Subject::Measured);
+    assert!(results::subjects_apart(state(&rig), &mean, &measured).is_none(), "no view colors by it");
+    rig.shoot("compare-clouds");
+    set(&mut rig, "mean:seeds=2", "measured", VersusMode::Apart);
+    let (key, apart) = results::subjects_apart(state(&rig), &mean, &measured).expect("the view shows it");
+    let cloud = state(&rig).results.clouds.get(&key.a).unwrap().surface().finger(lab::RIGHT).unwrap();
+    let other = state(&rig).results.clouds.get(&key.b).unwrap().surface().finger(lab::RIGHT).unwrap();
+    let distances = apart.points[lab::RIGHT].as_ref().unwrap();
+    assert_eq!(distances.len(), cloud.points.len());
+    let imprint = |subject: &Subject| results::subject(state(&rig), subject, lab::RIGHT).ready().unwrap();
+    let (a, b) = (imprint(&mean), imprint(&measured));
+    for i in (0..distances.len()).step_by(997) {
+        let nearest = other.points.iter().map(|p| p.distance(cloud.points[i])).fold(f64::INFINITY, f64::min);
+        assert!((f64::from(distances[i]).abs() - nearest).abs() < 1e-7);
+        let at = (usize::from(cloud.pixels[i][0]), usize::from(cloud.pixels[i][1]));
+        assert_eq!(distances[i] < 0.0, a[at] < b[at] && nearest > 0.0);
+    }
+    rig.shoot("compare-apart");
     rig.send(prefer(|s| s.workspace = Workspace::Align));
     assert_eq!(state(&rig).settings.compared(), Versus::default());
     rig.send(prefer(|s| s.workspace = Workspace::Inspect));
     rig.restart([1280.0, 800.0]);
-    assert_eq!(state(&rig).settings.compared().a, seed(7), "kept in the preferences");
+    assert_eq!(state(&rig).settings.compared().a, mean, "kept in the preferences");
     assert!(Action::SwapCompared.command(state(&rig)).is_some());
     // What is not there says so.
-    let gone = Subject::Predicted(RecipeChange { bundle: Some("gone".into()), ..RecipeChange::default() });
-    set(&mut rig, Subject::Stored, gone, VersusMode::Side);
+    set(&mut rig, "stored", "prediction:bundle=gone", VersusMode::Side);
     assert!(rig.harness.query_all_by_label_contains("is gone; choose another").next().is_some());
 }

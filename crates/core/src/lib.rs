@@ -15,6 +15,7 @@ pub mod dataset;
 pub mod deviation;
 pub mod diffusion;
 pub mod doubt;
+pub mod ensemble;
 pub mod evaluation;
 pub mod field;
 pub mod findings;

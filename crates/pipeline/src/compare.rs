@@ -1,5 +1,6 @@
 //! Imprints of the same touch against each other: [`between`], and a prediction against the measurement: [`of_pad`].
 
+pub mod depict;
 pub mod deviation;
 pub mod subject;
 

@@ -9,6 +9,7 @@ use super::super::{learn, recipe, results};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::pose::Registration;
+use touch2touch_pipeline::compare::subject::{RecipeChange, Subject};
 use touch2touch_pipeline::learn::train::MasksFrom;
 use touch2touch_pipeline::steps::bundles::BundleKind;
 use touch2touch_pipeline::steps::recipe::{Recipe, Stage, Words, quoted};
@@ -59,6 +60,13 @@ pub fn equivalent_words(state: &State, pane: Pane) -> Option<Vec<String>> {
         }
         (Pane::Generate | Pane::Predicted, _) => {
             of_pair("generate")?.option("--finger", "both").option("--out", "predictions").then(drawn())
+        }
+        (Pane::Compare, _) => {
+            let versus = state.settings.compared();
+            of_pair("compare")?
+                .option("--a", placed(state, &versus.a))
+                .option("--b", placed(state, &versus.b))
+                .then(recipe_shown(state, ImprintSource::Predicted).words(Stage::Pose))
         }
         (Pane::Masks, _) => of_pair("label")?,
         (Pane::Results | Pane::Table, _) => {
@@ -111,6 +119,22 @@ fn train_words(state: &State, words: Words) -> Words {
 pub fn equivalent(state: &State, pane: Pane) -> Option<String> {
     let words: Vec<String> = equivalent_words(state, pane)?.iter().map(|word| quoted(word)).collect();
     Some(words.join(" "))
+}
+
+/// A subject with the folder of its bundle in place of the bundle's name.
+fn placed(state: &State, subject: &Subject) -> Subject {
+    let placed = |change: &RecipeChange| {
+        let bundle = change.bundle.as_ref().map(|name| {
+            let found = state.library.bundles.iter().find(|bundle| bundle.name == *name);
+            found.map_or_else(|| name.clone(), |bundle| bundle.origin.path().display().to_string())
+        });
+        RecipeChange { bundle, ..change.clone() }
+    };
+    match subject {
+        Subject::Predicted(change) => Subject::Predicted(placed(change)),
+        Subject::Mean(change, seeds) => Subject::Mean(placed(change), *seeds),
+        other => other.clone(),
+    }
 }
 
 /// The recipe of what is shown of an imprint: by the prediction on screen, or the one that would be made.

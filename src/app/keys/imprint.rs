@@ -10,6 +10,8 @@ pub enum ImprintKey {
     Measured(TouchKey),
     /// Derived from a prediction.
     Predicted(PredictionKey, ShiftMode),
+    /// The mean of several predictions.
+    Mean(MeanKey),
     /// The prediction of another program that lies beside the pair.
     Picture(TouchKey),
 }
@@ -20,6 +22,7 @@ impl ImprintKey {
         match self {
             Self::Measured(touch) | Self::Picture(touch) => *touch,
             Self::Predicted(recipe, _) => recipe.touch,
+            Self::Mean(key) => key.touch,
         }
     }
 
@@ -28,7 +31,7 @@ impl ImprintKey {
         match self {
             Self::Measured(_) => Some(ImprintOf::Measured),
             Self::Predicted(recipe, shift) => Some(ImprintOf::predicted(&recipe.bundle, &recipe.config, *shift)),
-            Self::Picture(_) => None,
+            Self::Mean(_) | Self::Picture(_) => None,
         }
     }
 
@@ -36,9 +39,20 @@ impl ImprintKey {
     pub fn side(&self) -> ImprintSource {
         match self {
             Self::Measured(_) => ImprintSource::Measured,
-            Self::Predicted(..) | Self::Picture(_) => ImprintSource::Predicted,
+            Self::Predicted(..) | Self::Mean(_) | Self::Picture(_) => ImprintSource::Predicted,
         }
     }
+}
+
+/// The mean of several predictions of one touch.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct MeanKey {
+    /// The touch.
+    pub touch: TouchKey,
+    /// At least one; they differ in their seeds.
+    pub recipes: Vec<PredictionKey>,
+    /// The mapping to meters.
+    pub shift: ShiftMode,
 }
 
 /// An automatic mask of one imprint.

@@ -42,6 +42,7 @@ pub(crate) fn imprint_of<'a>(state: &'a State, key: &ImprintKey) -> Lookup<'a, D
             felt.and_then(Absent::NoBubble, |felt| Some(&felt.depth()?.imprint))
         }
         ImprintKey::Predicted(recipe, shift) => state.look(MetersKey(recipe.clone(), *shift)).value(),
+        ImprintKey::Mean(key) => state.look(key.clone()).value(),
         ImprintKey::Picture(touch) => state.look(PictureKey(*touch)).map(|found| &found.imprint),
     }
 }

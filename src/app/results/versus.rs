@@ -1,12 +1,12 @@
-//! Any two imprints of a touch against each other: what each side is, their figures and poses.
+//! Any two imprints of a touch against each other: what each side is, their figures, clouds and poses.
 
 use std::borrow::Cow;
 use std::sync::Arc;
 
 use super::super::jobs::{Job, Lane};
 use super::super::keys::{
-    CloudKey, ComparedKey, ImprintKey, ImprintSource, MaskKey, MetersKey, PictureKey, PoseKey, PredictionKey,
-    ShiftMode, TouchKey, VersusKey,
+    CloudDifferenceKey, CloudKey, ComparedKey, ImprintKey, ImprintSource, MaskKey, MeanKey, MetersKey, PictureKey,
+    PoseKey, PredictionKey, ShiftMode, TouchKey, VersusKey,
 };
 use super::super::pane::Demand;
 use super::super::results::{Computes, Demands};
@@ -17,11 +17,25 @@ use super::super::{recipe, results};
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::rig::PadId;
 use touch2touch_core::sample::Sample;
-use touch2touch_pipeline::compare::subject::{RecipeChange, Subject};
+use touch2touch_pipeline::compare::depict::mean;
+use touch2touch_pipeline::compare::deviation::{CloudDifference, cloud_difference};
+use touch2touch_pipeline::compare::subject::{MadeFrom, RecipeChange, Subject};
 use touch2touch_pipeline::compare::{Beside, Comparison, Depicted, between, tile_of};
 use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::steps::cloud::Clouds;
 use touch2touch_pipeline::steps::pose::PoseResult;
 use touch2touch_pipeline::steps::prediction::Prediction;
+
+impl Computes for MeanKey {
+    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<DepthMap>> {
+        let meters =
+            |recipe: &PredictionKey| state.results.imprints.get(&MetersKey(recipe.clone(), self.shift)).cloned();
+        let imprints: Vec<Arc<DepthMap>> = self.recipes.iter().map(meters).collect::<Option<_>>()?;
+        Some(Job::new(Lane::Compute, "Mean of the seeds", move |_| {
+            mean(&imprints.iter().map(|i| &**i).collect::<Vec<_>>())
+        }))
+    }
+}
 
 impl Computes for ComparedKey {
     fn job(&self, state: &State, services: &SharedServices) -> Option<Job<Prediction>> {
@@ -50,7 +64,7 @@ impl Part {
                 drawn = Some((state.results.predictions.get(recipe)?.clone(), *shift));
             }
             ImprintKey::Picture(touch) => beside = Some(state.results.pictures.get(&PictureKey(*touch))?.clone()),
-            ImprintKey::Measured(_) => {}
+            ImprintKey::Measured(_) | ImprintKey::Mean(_) => {}
         }
         let imprint = results::imprint_of(state, of).ready()?.clone();
         Some(Self { of: of.clone(), imprint, drawn, beside })
@@ -95,6 +109,14 @@ impl Computes for VersusKey {
     }
 }
 
+impl Computes for CloudDifferenceKey {
+    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<CloudDifference>> {
+        let cloud = |key: &CloudKey| state.results.clouds.get(key).cloned();
+        let (a, b) = (cloud(&self.a)?, cloud(&self.b)?);
+        Some(Job::new(Lane::Compute, "Distances between clouds", move |_| Ok(cloud_difference(&a, &b))))
+    }
+}
+
 /// The side that shows a subject already.
 fn side_of(subject: &Subject) -> Option<ImprintSource> {
     match subject {
@@ -104,15 +126,27 @@ fn side_of(subject: &Subject) -> Option<ImprintSource> {
     }
 }
 
-/// The key of the prediction that a subject of a touch is made of, and how it becomes meters; `None` of what is not made.
-fn made_for(state: &State, subject: &Subject, touch: TouchKey) -> Result<Option<(PredictionKey, ShiftMode)>, Absent> {
-    let Some(change) = subject.change() else { return Ok(None) };
-    let recipe = change.of(|named| recipe::of_generator(state, named))?;
-    let key = PredictionKey::of(touch, &recipe).ok_or(Absent::NoSuchGenerator)?;
-    if state.library.predicts_color(&key.bundle) {
+/// The recipes that a subject is made from by the settings.
+///
+/// # Errors
+/// Why it cannot be made.
+fn made_from(state: &State, subject: &Subject) -> Result<MadeFrom, Absent> {
+    subject.made_from(|named| recipe::of_generator(state, named))
+}
+
+/// The keys of the predictions that a subject of a touch is made of, and how they become meters; none of what is not made.
+fn made_for(state: &State, subject: &Subject, touch: TouchKey) -> Result<(Vec<PredictionKey>, ShiftMode), Absent> {
+    let recipes = match made_from(state, subject)? {
+        MadeFrom::Measurement | MadeFrom::Picture => Vec::new(),
+        MadeFrom::Prediction(recipe) => vec![recipe],
+        MadeFrom::Mean(recipes) => recipes,
+    };
+    let shift = recipes.first().map_or(state.settings.shift, |recipe| recipe.shift);
+    let keys: Vec<PredictionKey> = recipes.iter().filter_map(|recipe| PredictionKey::of(touch, recipe)).collect();
+    if keys.first().is_some_and(|key| state.library.predicts_color(&key.bundle)) {
         return Err(Absent::PredictsColor);
     }
-    Ok(Some((key, recipe.shift)))
+    Ok((keys, shift))
 }
 
 /// The imprint that a subject is of a finger.
@@ -128,8 +162,13 @@ pub fn subject_key(state: &State, subject: &Subject, finger: PadId) -> Result<Im
             results::imprint_key(state, ImprintSource::Predicted, finger)
         }
         Subject::Predicted(_) => {
-            let (recipe, shift) = made_for(state, subject, touch)?.ok_or(Absent::NoSuchGenerator)?;
+            let (mut recipes, shift) = made_for(state, subject, touch)?;
+            let recipe = recipes.pop().ok_or(Absent::NoSuchGenerator)?;
             Ok(ImprintKey::Predicted(recipe, shift))
+        }
+        Subject::Mean(..) => {
+            let (recipes, shift) = made_for(state, subject, touch)?;
+            Ok(ImprintKey::Mean(MeanKey { touch, recipes, shift }))
         }
         Subject::Stored => Ok(ImprintKey::Picture(touch)),
     }
@@ -142,12 +181,12 @@ pub fn subject<'a>(state: &'a State, subject: &Subject, finger: PadId) -> Lookup
         Err(absent) => return Lookup::Absent(absent),
     };
     let unmade = match (&key, state.touch_key(finger)) {
-        (ImprintKey::Predicted(..), Some(touch)) => {
+        (ImprintKey::Predicted(..) | ImprintKey::Mean(_), Some(touch)) => {
             if results::sample(state).ready().is_some() && !results::can_start(state, finger) {
                 return Lookup::Absent(Absent::NoInput);
             }
-            let made = made_for(state, subject, touch).ok().flatten();
-            made.and_then(|(recipe, _)| state.failure(ComparedKey(recipe)))
+            let made = made_for(state, subject, touch).map(|(recipes, _)| recipes).unwrap_or_default();
+            made.into_iter().find_map(|recipe| state.failure(ComparedKey(recipe)))
         }
         _ => None,
     };
@@ -175,6 +214,13 @@ fn subject_cloud(state: &State, subject: &Subject) -> Result<CloudKey, Vec<MaskK
     }
 }
 
+/// The surface points of a subject, where they are there, with their recipe.
+pub(crate) fn subject_points<'a>(state: &'a State, subject: &Subject) -> Option<(CloudKey, &'a Clouds)> {
+    let key = subject_cloud(state, subject).ok()?;
+    let found = state.results.clouds.get(&key)?.surface();
+    Some((key, found))
+}
+
 fn subject_pose_key(state: &State, subject: &Subject) -> Option<PoseKey> {
     if let Some(side) = side_of(subject) {
         return results::pose_key(state, side).ok()?;
@@ -196,6 +242,17 @@ pub(crate) fn pose_absent(state: &State) -> Option<Absent> {
 /// The pose of a subject, where it is there.
 pub fn subject_pose<'a>(state: &'a State, subject: &Subject) -> Option<&'a PoseResult> {
     state.results.poses.get(&subject_pose_key(state, subject)?).map(|pose| &**pose)
+}
+
+/// The distances of the points of one subject from those of another, where they are there, with their key.
+pub fn subjects_apart<'a>(
+    state: &'a State,
+    a: &Subject,
+    b: &Subject,
+) -> Option<(CloudDifferenceKey, &'a CloudDifference)> {
+    let key = CloudDifferenceKey { a: subject_cloud(state, a).ok()?, b: subject_cloud(state, b).ok()? };
+    let found = state.results.apart.get(&key)?;
+    Some((key, found))
 }
 
 /// Asks for what the pane of the comparison shows and is not there.
@@ -233,6 +290,14 @@ pub(crate) fn want_versus(wants: &mut Demands<'_>) {
     for subject in &both {
         want_subject_place(wants, subject);
     }
+    let clouds = both.each_ref().map(|subject| subject_cloud(state, subject).ok());
+    if let [Some(a), Some(b)] = clouds
+        && mode == VersusMode::Apart
+        && state.results.clouds.contains(&a)
+        && state.results.clouds.contains(&b)
+    {
+        wants.ask(CloudDifferenceKey { a, b });
+    }
 }
 
 pub(crate) fn want_is_there(wants: &Demands<'_>, key: &ImprintKey) -> bool {
@@ -251,12 +316,23 @@ pub(crate) fn want_subject(wants: &mut Demands<'_>, subject: &Subject, finger: P
             results::want_other_finger(wants, finger);
         }
         (None, Ok(ImprintKey::Picture(touch))) => wants.ask(PictureKey(touch)),
-        (None, Ok(_)) if results::can_start(state, finger) => {
-            let Ok(Some((recipe, shift))) = made_for(state, subject, touch) else { return };
-            if state.results.predictions.contains(&recipe) {
-                wants.ask(MetersKey(recipe, shift));
-            } else {
-                wants.ask_unless(state.tasks.generating(&recipe).is_some(), ComparedKey(recipe));
+        (None, Ok(key)) if results::can_start(state, finger) => {
+            let Ok((recipes, shift)) = made_for(state, subject, touch) else { return };
+            let mut whole = true;
+            for recipe in recipes {
+                if state.results.predictions.contains(&recipe) {
+                    let meters = MetersKey(recipe, shift);
+                    whole &= state.results.imprints.contains(&meters);
+                    wants.ask(meters);
+                } else {
+                    whole = false;
+                    wants.ask_unless(state.tasks.generating(&recipe).is_some(), ComparedKey(recipe));
+                }
+            }
+            if let ImprintKey::Mean(key) = key
+                && whole
+            {
+                wants.ask(key);
             }
         }
         (None, _) => {}

@@ -19,7 +19,7 @@ use touch2touch_core::grid::{DepthMap, RgbGrid};
 use touch2touch_core::postprocess::Flag;
 use touch2touch_core::sample::Sample;
 use touch2touch_core::which_tool::Candidate;
-use touch2touch_pipeline::compare::deviation::Deviation;
+use touch2touch_pipeline::compare::deviation::{CloudDifference, Deviation};
 use touch2touch_pipeline::compare::{Beside, Comparison};
 use touch2touch_pipeline::doctor::Fact;
 use touch2touch_pipeline::export::Plan;
@@ -51,6 +51,8 @@ macro_rules! table {
         Prediction(PredictionKey => Prediction, |made| made.raw.channels.iter().map(|c| c.len() * 4).sum()) in predictions, 256 * MIB;
         /// A prediction of the pair on screen that nobody asked for: kept with the others.
         Prefetch(PrefetchKey => Prediction);
+        /// The mean of several predictions of one touch.
+        Mean(MeanKey => DepthMap, |mean| mean.len() * 4) in means, 16 * MIB;
         /// A prediction in meters, as large as the bubble image.
         Imprint(MetersKey => DepthMap, |imprint| imprint.len() * 4) in imprints, 64 * MIB;
         /// A prediction of a color sensor: differences, 0..255 scale.
@@ -61,6 +63,8 @@ macro_rules! table {
         Compared(ComparedKey => Prediction);
         /// Any two imprints of a touch against each other.
         Versus(VersusKey => Comparison, |found| found.error.len() * 4) in versus, 64 * MIB;
+        /// The distances of the points of one cloud from another.
+        Apart(CloudDifferenceKey => CloudDifference, CloudDifference::bytes) in apart, 16 * MIB;
         /// Flags: implausible things about the way of a prediction to meters.
         Flags(FlagsKey => Vec<Flag>, |found| found.len() * 512) in flags, MIB;
         /// The ambiguity of a GelSlim image: what it leaves open.

@@ -53,6 +53,21 @@ pub struct ModelArgs {
     pub(super) found: Rc<OnceCell<FoundBundles>>,
 }
 
+impl ModelArgs {
+    /// Arguments with another generator, named by its folder, or as it calls itself.
+    pub(in crate::headless) fn with_generator(&self, name: &str) -> Self {
+        let found = self.found.get_or_init(|| bundles::find(&[]));
+        let named = found.bundles.iter().find(|b| b.kind == BundleKind::Generator && b.name == *name);
+        let bundle = Some(named.map_or_else(|| PathBuf::from(name), |bundle| bundle.origin.path()));
+        Self { bundle, ..self.clone() }
+    }
+
+    /// Arguments with the mapping that is there without options: for what names its own.
+    pub(in crate::headless) fn without_mapping(&self) -> Self {
+        Self { mapping: MappingArgs { shift: ShiftChoice::default() }, ..self.clone() }
+    }
+}
+
 fn guidance(text: &str) -> Result<f64, String> {
     let value = text.parse().ok().filter(|scale| GUIDANCE.contains(scale));
     value.ok_or_else(|| format!("choose {} to {}; 1 is none", GUIDANCE.start(), GUIDANCE.end()))

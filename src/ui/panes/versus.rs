@@ -2,6 +2,7 @@
 
 mod choose;
 mod figures;
+mod space;
 
 use crate::app::results;
 use crate::app::settings::prefer;
@@ -30,11 +31,13 @@ use touch2touch_pipeline::compare::subject::Subject;
 pub(crate) struct Memory {
     /// Position of the wipe's line, as a share of the picture's width.
     wipe: f32,
+    /// The 3D view.
+    space: space::Space,
 }
 
 impl Default for Memory {
     fn default() -> Self {
-        Self { wipe: 0.5 }
+        Self { wipe: 0.5, space: space::Space::default() }
     }
 }
 
@@ -86,6 +89,10 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
     let flipped = flickers(ui);
     let full = ui.available_rect_before_wrap();
     ui.advance_cursor_after_rect(full);
+    if versus.mode.is_3d() {
+        let mut child = ui.new_child(UiBuilder::new().max_rect(full).id_salt("compared in 3D"));
+        return space::show(cx, &mut child, &mut memory.space, &versus, flipped);
+    }
     let area = full.with_max_y((full.bottom() - colorbar::HEIGHT).max(full.top() + 16.0));
     let shown = cx.state.fingers();
     let fingers: Vec<PadId> = cx.state.rig().pads().filter(|f| shown.contains(f)).collect();

@@ -43,7 +43,7 @@ use touch2touch_core::label::{CleanKind, CleanUp, Layers, Paint, Sight};
 use touch2touch_core::manual::PoseAxis;
 use touch2touch_core::pose::Gate;
 use touch2touch_core::rig::{PadId, lab};
-use touch2touch_pipeline::compare::subject::{Mapping, RecipeChange, Subject};
+use touch2touch_pipeline::compare::subject::Subject;
 use touch2touch_pipeline::doctor::{Cure, Examined, Worth};
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::export::{ExportChoice, Which};
@@ -126,15 +126,16 @@ fn scene() -> impl Strategy<Value = SceneLook> {
 }
 
 fn subject() -> impl Strategy<Value = Subject> {
-    let other = RecipeChange { steps: Some(3), shift: Some(Mapping::Raw), ..RecipeChange::default() };
-    let predicted = [
-        RecipeChange::default(),
-        RecipeChange { seed: Some(7), ..RecipeChange::default() },
-        RecipeChange { bundle: Some("gen".into()), ..other.clone() },
-        RecipeChange { bundle: Some("not there, really".into()), ..other },
+    let texts = [
+        "measured",
+        "prediction",
+        "prediction:seed=7",
+        "prediction:bundle=gen,steps=3,shift=raw",
+        "prediction:bundle=\"not there, really\"",
+        "mean:seeds=2",
+        "stored",
     ];
-    let all = predicted.map(Subject::Predicted).into_iter().chain([Subject::Measured, Subject::Stored]);
-    select(all.collect::<Vec<_>>())
+    select(texts.map(|text| text.parse().expect("a subject")).to_vec())
 }
 
 fn versus() -> impl Strategy<Value = Versus> {

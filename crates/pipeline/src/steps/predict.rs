@@ -57,6 +57,22 @@ impl Generating<'_> {
         Ok(sample.pad(pad).and_then(|touch| touch.picture(input)))
     }
 
+    /// The predictions of a pad with several seeds.
+    ///
+    /// # Errors
+    /// If the pad has no picture to start from, or as [`Models::predict`].
+    pub fn seeds(
+        self,
+        models: &Models,
+        OnPad { sample, pad }: OnPad<'_>,
+        seeds: &[u64],
+        cx: &JobCx,
+    ) -> Result<Vec<Prediction>, TaskError> {
+        let picture = self.picture(sample, pad)?.ok_or_else(|| self.no_input(&sample.rig))?;
+        let wanted = |&seed: &u64| GenerateInput { difference: &picture, seed, size: [0, 0] };
+        models.predict(self.bundle, self.engine, self.config, &seeds.iter().map(wanted).collect::<Vec<_>>(), cx)
+    }
+
     /// The predictions of pictures that it starts from, in their order.
     ///
     /// # Errors

@@ -177,6 +177,17 @@ impl Recipe {
         Self { imprint, ..self.clone() }
     }
 
+    /// So many recipes that differ from it in their seeds alone, from its own on; none where nothing is predicted.
+    pub(crate) fn with_seeds(&self, count: usize) -> Vec<Self> {
+        let Some((_, own)) = &self.generator else { return Vec::new() };
+        let with = |later: u64| {
+            let mut with = self.clone();
+            with.generator.iter_mut().for_each(|(_, config)| config.seed = own.seed.wrapping_add(later));
+            with
+        };
+        (0..count as u64).map(with).collect()
+    }
+
     /// Only what decides the result of a stage: what comes later, and what is not used, is as it goes without saying.
     #[must_use]
     pub fn until(&self, stage: Stage) -> Self {

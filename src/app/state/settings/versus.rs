@@ -16,6 +16,10 @@ pub enum VersusMode {
     /// A minus B.
     #[default]
     Difference,
+    /// Both clouds in 3D.
+    Clouds,
+    /// The cloud of A in 3D, colored by how far it lies from that of B.
+    Apart,
 }
 
 impl VersusMode {
@@ -25,6 +29,8 @@ impl VersusMode {
             Self::Side => "Side",
             Self::Wipe => "Wipe",
             Self::Difference => "Difference",
+            Self::Clouds => "3D",
+            Self::Apart => "3D difference",
         }
     }
 
@@ -34,7 +40,14 @@ impl VersusMode {
             Self::Side => "A on the left, B on the right",
             Self::Wipe => "A left, B right of a line that you drag",
             Self::Difference => "A minus B in millimeters: blue where A is shallower, red where it is deeper",
+            Self::Clouds => "Contact points of both in 3D, with the CAD model at both poses",
+            Self::Apart => "Points of A in 3D, colored by their distance to the surface of B, in mm",
         }
+    }
+
+    /// True where it is a 3D view.
+    pub fn is_3d(self) -> bool {
+        matches!(self, Self::Clouds | Self::Apart)
     }
 }
 

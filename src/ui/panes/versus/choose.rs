@@ -12,7 +12,7 @@ use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{SMALL, caption};
 use crate::ui::parts::widget::cut::cut_in_the_middle;
 use touch2touch_core::rig::SensorKind;
-use touch2touch_pipeline::compare::subject::{Mapping, RecipeChange, Subject};
+use touch2touch_pipeline::compare::subject::{Mapping, RecipeChange, SEEDS, Subject};
 use touch2touch_pipeline::steps::bundles::BundleInfo;
 
 /// Width of a letter in a button, points.
@@ -48,6 +48,11 @@ fn content(cx: &Cx<'_>, ui: &mut Ui, subject: &Subject) -> Option<Subject> {
     };
     row(ui, Subject::Measured, "Measured", "What the Soft Bubble measured");
     row(ui, Subject::shown(), "Prediction on screen", "The prediction that the other panes show");
+    let mean = match subject {
+        Subject::Mean(..) => subject.clone(),
+        _ => Subject::Mean(RecipeChange::default(), 8),
+    };
+    row(ui, mean, "Mean of seeds", "Mean of predictions with different seeds");
     row(ui, Subject::Stored, "Stored picture", "Prediction of another program: NAME_vqvae.png beside the pair");
     let variants = variants(cx);
     if !variants.is_empty() {
@@ -63,7 +68,19 @@ fn content(cx: &Cx<'_>, ui: &mut Ui, subject: &Subject) -> Option<Subject> {
     ui.label(caption("Another prediction", cx.p));
     let variant = subject.change().cloned().unwrap_or_default();
     if let Some(variant) = change(cx, ui, &variant) {
-        chosen = Some(Subject::Predicted(variant));
+        chosen = Some(match subject {
+            Subject::Mean(_, count) => Subject::Mean(variant, *count),
+            _ => Subject::Predicted(variant),
+        });
+    }
+    if let Subject::Mean(variant, count) = subject {
+        let mut count = *count;
+        ui.horizontal(|ui| {
+            ui.label("Seeds");
+            if ui.add(DragValue::new(&mut count).range(SEEDS)).changed() {
+                chosen = Some(Subject::Mean(variant.clone(), count));
+            }
+        });
     }
     chosen
 }
