@@ -78,6 +78,7 @@ fn how(action: Action) -> How {
         A::ExportMeasured => Verb(&["export", "demo", "--pair", "a", "--out", "folder"]),
         A::ExportPredicted => Verb(&["export", "demo", "--pair", "a", "--imprint", "predicted", "--out", "folder"]),
         A::ExportMasks => Verb(&["masks", "export", "demo", "--out", "folder"]),
+        A::ImportMasks => Verb(&["masks", "import", "demo", "--from", "folder"]),
         A::Generate => Verb(&["generate", "demo", "--out", "folder"]),
         A::GenerateNewSeed | A::LockSeed => Options(&["generate", "demo", "--out", "folder", "--seed", "7"]),
         A::FitPairs => Verb(&["adapt", "demo", "--out", "folder"]),

@@ -44,7 +44,7 @@ use touch2touch_core::sample::Sample;
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::export::{ExportChoice, Plan, Which};
 use touch2touch_pipeline::infer::engine::EngineChoice;
-use touch2touch_pipeline::io::exchange::{MANIFEST, check_folder};
+use touch2touch_pipeline::io::exchange::{Format, MANIFEST, list};
 use touch2touch_pipeline::io::images;
 use touch2touch_pipeline::io::masks::{FOLDER, MaskStore};
 use touch2touch_pipeline::job::JobCx;
@@ -234,7 +234,9 @@ fn script(folder: &Path, seed: u64) -> Vec<Vec<Command>> {
                 [Review::Done, Review::Flagged, Review::Skip][rng.random_range(0..3)],
             ))],
             17 | 18 => {
-                let choice = ExportChoice { which: Which::Begun, ..ExportChoice::default() };
+                let formats: Vec<Format> = Format::iter().collect();
+                let format = formats[rng.random_range(0..formats.len())];
+                let choice = ExportChoice { which: Which::Begun, format, ..ExportChoice::default() };
                 vec![
                     Command::Export(ExportCommand::SetMasks(choice)),
                     Command::Export(ExportCommand::Write(Output::Masks, exported(folder))),
@@ -472,9 +474,9 @@ fn look_at_exports(beside: &Path, seen: &mut Exports) {
                 let found: String = sha2::Sha256::digest(&bytes).iter().map(|b| format!("{b:02x}")).collect();
                 assert_eq!(*sha256, found, "{file}");
             }
-            let found = check_folder(&folder);
-            let masks = found.counts.iter().sum::<usize>();
-            assert_eq!((masks, found.problems), (says["stems"].as_object().unwrap().len(), Vec::new()));
+            let found = list(&folder, None).unwrap();
+            assert_eq!((found.masks.len(), found.refused.len()), (says["stems"].as_object().unwrap().len(), 0));
+            assert!(found.masks.iter().all(|listed| listed.read().is_ok()));
             seen.whole += usize::from(folder.ends_with("exported"));
         }
     }

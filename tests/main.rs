@@ -15,6 +15,7 @@ mod apply;
 mod cli;
 #[cfg(feature = "onnx")]
 mod cli_generate;
+mod exchange;
 mod fuzz;
 mod io;
 mod kill;

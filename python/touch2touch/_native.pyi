@@ -194,6 +194,7 @@ def export_masks(
     data: Dataset | str | PathLike[str],
     out: str | PathLike[str],
     *,
+    format: str | None = None,
     pairs: str = "done",
     test_in_train: bool = False,
     by_tool: bool = False,

@@ -156,6 +156,8 @@ fn next_shift(state: &State) -> Option<Command> {
 fn cancel(state: &State) -> Option<Command> {
     if state.document.stroke.is_some() {
         does(LabelsCommand::CancelStroke)
+    } else if state.export.importing.is_some() {
+        does(ExportCommand::AskImport(None))
     } else if state.export.asking_masks {
         does(ExportCommand::AskMasks(false))
     } else if results::proposes(state) {

@@ -69,8 +69,10 @@ macro_rules! actions {
             state => export(state, ImprintSource::Measured);
         ExportPredicted, File, "Export the predicted pair…", "Writes point cloud (PLY), pose (JSON) and CAD model in the hand (STL), from the predicted imprint", [],
             state => export(state, ImprintSource::Predicted);
-        ExportMasks, File, "Export masks…", "Writes masks as a folder for UNet training", [ctrl(K::E)],
+        ExportMasks, File, "Export masks…", "Writes masks as a folder for UNet training, or as PNG only", [ctrl(K::E)],
             state => opened(state, ExportCommand::AskMasks(true));
+        ImportMasks, File, "Import masks…", "Reads masks from a folder of PNG files with the names of an export; what you drew stays", [],
+            state => opened(state, ViewCommand::Ui(UiRequest::PickMasks));
 
         PreviousPair, Navigate, "Previous pair", "Shows the previous pair of the list", [plain(K::A), plain(K::PageUp)],
             state => listed(state, LibraryCommand::Step(-1));
@@ -417,6 +419,7 @@ impl Action {
             Self::Reload => "refresh again",
             Self::AboutData => "doctor facts summary info problems what is own",
             Self::ExportMasks => "unet training labels png save",
+            Self::ImportMasks => "unet labels png load read",
             Self::NextWorst => "bad largest error outlier failure hardest",
             Self::NextUnfinished => "todo open unlabeled remaining",
             Self::FindPair => "search list find samples",

@@ -23,6 +23,7 @@ pub fn demands(state: &State) -> Vec<Request> {
     results::want_doctor(&mut wants);
     neighbors(&mut wants);
     results::want_mask_plan(&mut wants);
+    results::want_import_plan(&mut wants);
     results::want_train_plan(&mut wants);
     wants.list
 }

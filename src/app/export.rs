@@ -3,6 +3,7 @@
 mod command;
 mod setup;
 
+pub use super::keys::ImportForm;
 pub use super::state::export::{Output, StillAsked};
 pub use command::{equivalent, equivalent_words};
 pub use setup::{PairExport, pair_export};
@@ -12,7 +13,10 @@ use std::path::PathBuf;
 
 use super::effect::Effect;
 use super::jobs::Lane;
+use super::labels::ImportMasks;
+use super::results;
 use super::state::State;
+use super::state::tasks::TaskKind;
 use super::state::view::UiRequest;
 use super::tasks::{self, Write};
 use crate::spatial;
@@ -27,6 +31,12 @@ pub enum ExportCommand {
     AskMasks(bool),
     /// Changes what it says.
     SetMasks(ExportChoice),
+    /// Says what an import of masks from a folder or file would change; `None` asks no more.
+    AskImport(Option<PathBuf>),
+    /// True where it replaces what was painted by hand as well.
+    ImportOverHand(bool),
+    /// Does it.
+    Import,
     /// Asks where something is to be written.
     Place(Output),
     /// Writes it.
@@ -37,9 +47,30 @@ pub(super) fn step(state: &mut State, command: ExportCommand, effects: &mut Vec<
     match command {
         ExportCommand::AskMasks(asking) => state.export.asking_masks = asking,
         ExportCommand::SetMasks(choice) => state.export.masks = choice,
+        ExportCommand::AskImport(from) => {
+            state.export.imports += 1;
+            let asked = state.export.imports;
+            state.export.importing = from.map(|from| ImportForm { from, over_drawn: false, asked });
+        }
+        ExportCommand::ImportOverHand(over_drawn) => {
+            if let Some(form) = &mut state.export.importing {
+                form.over_drawn = over_drawn;
+            }
+        }
+        ExportCommand::Import => import(state, effects),
         ExportCommand::Place(output) => effects.push(Effect::Ui(UiRequest::PickOutput(output))),
         ExportCommand::Write(output, file) => write(state, output, file, effects),
     }
+}
+
+fn import(state: &mut State, effects: &mut Vec<Effect>) {
+    let (Some(setup), Some(open)) = (results::import_setup(state), &state.library.open) else { return };
+    if state.tasks.of_kind(TaskKind::Import).is_some() {
+        return;
+    }
+    let source = open.source.clone();
+    state.export.importing = None;
+    tasks::start(state, TaskKind::Import.name(), ImportMasks { source, setup }, effects);
 }
 
 fn write(state: &mut State, output: Output, file: PathBuf, effects: &mut Vec<Effect>) {

@@ -18,7 +18,7 @@ pub use touch2touch_core::postprocess::ShiftMode;
 pub use touch2touch_pipeline::labels::{ImprintSource, Revision};
 pub use touch2touch_pipeline::steps::mask::MaskRecipe;
 
-pub use dataset::{AboutKey, MaskPlanKey, ToolKey, TrainPlanKey};
+pub use dataset::{AboutKey, ImportForm, ImportPlanKey, MaskPlanKey, ToolKey, TrainPlanKey};
 pub use imprint::{ImprintKey, MaskKey, MaskVersion, MeanKey, VersusKey};
 pub use inspection::Inspection;
 pub use pose::{CloudDifferenceKey, CloudKey, PoseBits, PoseKey, RunKey};

@@ -1,9 +1,11 @@
 //! The room of the document: strokes, clean-ups, review states, accepted poses, undo, saving.
 
+mod import;
 pub(super) mod unsaved;
 
 pub(crate) use super::state::labels::{Changed, Merged};
 pub use super::state::labels::{Document, DrawnMask, MaskPlace, PairLabels, Question, Review, Stored, Stroke};
+pub use import::ImportMasks;
 pub use unsaved::{UnsavedCommand, unsaved};
 
 use std::borrow::Cow;

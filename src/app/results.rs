@@ -43,8 +43,10 @@ pub(crate) use mask::{
 pub use on_screen::proposes;
 pub(crate) use on_screen::{fingers_to_generate, shows_cloud, shows_deviation, shows_layers, shows_steps};
 pub use outdated::{Outdated, Why, outdated};
-pub use plans::mask_plan_key;
-pub(crate) use plans::{doctor_key, train_plan_key, want_doctor, want_mask_plan, want_train_plan};
+pub(crate) use plans::{
+    doctor_key, import_setup, train_plan_key, want_doctor, want_import_plan, want_mask_plan, want_train_plan,
+};
+pub use plans::{import_plan_key, mask_plan_key};
 pub use pose::{pose, pose_key, provisional_pose};
 pub(crate) use pose::{registered, want_pose};
 pub use prediction::can_generate;

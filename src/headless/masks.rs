@@ -1,5 +1,6 @@
 //! `touch2touch masks`: contact masks as training folders, and a mask model trained on them.
 
+mod import;
 mod train;
 
 use std::collections::BTreeMap;
@@ -17,15 +18,17 @@ use touch2touch_core::pose::Registration;
 use touch2touch_pipeline::export::{
     Automatic, DrawnMasks, ExportChoice, ExportSetup, LeftOut, Which, export_masks, plan,
 };
-use touch2touch_pipeline::io::exchange::ExportReport;
+use touch2touch_pipeline::io::exchange::{ExportReport, Format};
 use touch2touch_pipeline::labels::{ImprintSource, Labels};
 use touch2touch_pipeline::steps::recipe::Recipe;
 
 /// Verbs of masks.
 #[derive(Debug, Subcommand)]
 pub(super) enum MasksVerb {
-    /// Write masks as a folder for the lab's UNet training, and check what was written.
+    /// Write masks for training, and check what was written.
     Export(ExportArgs),
+    /// Read masks in one of the export formats. Hand-drawn masks stay, and no pair is marked done.
+    Import(import::ImportArgs),
     /// Train a mask model on the masks of pairs marked "done", or on masks from CAD models at true poses, and score it on
     /// pairs that were left out.
     Train(train::TrainArgs),
@@ -39,6 +42,9 @@ pub(super) struct ExportArgs {
     /// The folder to write; empty, missing, or a previous export.
     #[arg(long)]
     out: PathBuf,
+    /// The format: a folder for the lab's UNet loader, or only masks as pictures.
+    #[arg(long, default_value = Format::default().key(), value_parser = keyed::<Format>())]
+    format: Format,
     /// Pairs to write: those marked "done" with a hand-drawn mask, also those begun, or all (`--mask` makes the missing
     /// masks). Pairs marked "skip" or "flagged" are never written.
     #[arg(long, default_value = Which::default().key(), value_parser = keyed::<Which>())]
@@ -94,6 +100,7 @@ struct Written {
 pub(super) fn run(verb: &MasksVerb) -> VerbResult {
     let args = match verb {
         MasksVerb::Export(args) => args,
+        MasksVerb::Import(args) => return import::run(args),
         MasksVerb::Train(args) => return train::run(args),
     };
     let dataset = args.dataset.open()?;
@@ -107,6 +114,7 @@ pub(super) fn run(verb: &MasksVerb) -> VerbResult {
             manual_checked: args.manual_checked,
             by_tool: args.by_tool,
             seed: args.split_seed,
+            format: args.format,
         },
     };
     let models = args.model.models();
@@ -128,7 +136,7 @@ pub(super) fn run(verb: &MasksVerb) -> VerbResult {
     let [train, val, test] = plan.counts;
     let exported = Exported {
         out: args.out.clone(),
-        format: "unet",
+        format: args.format.key(),
         train,
         val,
         test,

@@ -55,7 +55,9 @@ fn held(verb: &str) -> Option<Held> {
             labels::masks_proposed_by_a_random_recipe_are_those_of_the_verb,
             super::edits::a_drawing_and_a_clean_up_are_the_same_by_hand_and_by_verb,
         ]),
-        "masks export" => By(&[exchange::masks_are_exported_by_the_studio_as_by_the_verb]),
+        "masks export" | "masks import" => {
+            By(&[exchange::masks_are_imported_by_the_studio_as_by_the_verb_and_undo_takes_it_back])
+        }
         "masks train" => By(&[learned::TESTS[1]]),
         "simulate" => Not("the studio opens what it wrote, and simulates nothing but the demo"),
         "doctor" => By(&[

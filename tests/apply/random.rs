@@ -38,7 +38,7 @@ fn said(doc: &Document) -> Said {
 fn stays(command: &Command) -> bool {
     match command {
         Command::Library(LibraryCommand::Open(_) | LibraryCommand::Reload) => false,
-        Command::Answer(Answer::Ended(_, end)) => end.kind != TaskKind::ReadOtherwise,
+        Command::Answer(Answer::Ended(_, end)) => !matches!(end.kind, TaskKind::Import | TaskKind::ReadOtherwise),
         _ => true,
     }
 }

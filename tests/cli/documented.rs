@@ -47,6 +47,7 @@ static TABLE: &[(&str, How)] = &[
     ("touch2touch export", How::Run(&[], "", &[0])),
     ("touch2touch label", How::Run(&[], "", &[0])),
     ("touch2touch masks export", How::Run(&[], "", &[0])),
+    ("touch2touch masks import", How::Run(&[], "", &[0])),
     ("touch2touch masks train", How::Run(&[("10", "0.01")], "--test-in-train", &[0])),
     ("touch2touch masks train PATH --from cad", How::Run(&[], "--minutes 0.01 --test-in-train", &[0])),
     ("touch2touch masks train PATH --from cad --minutes", How::Run(&[("3", "0.01")], "--test-in-train", &[0])),

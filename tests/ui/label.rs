@@ -373,3 +373,51 @@ fn undo_and_redo_go_on_where_they_were_after_a_restart() {
     assert!(names(&rig).is_empty());
     assert_eq!(rig.mask(lab::RIGHT), masks[0]);
 }
+
+#[test]
+fn masks_are_exported_as_pictures_and_imported_again_by_clicks() {
+    let Some(mut rig) = Rig::new(SIZE, 2) else { return };
+    rig.send(prefer(|s| s.hint_dismissed = true));
+    rig.send(prefer(|s| s.workspace = Workspace::Label));
+    with_nothing_automatic(&mut rig);
+    rig.send(LabelsCommand::AdoptAutomatic);
+    let at = rig.harness.get_by_label("Measured imprint right").rect();
+    rig.drag_over(&[inside(at, 0.3, 0.4), inside(at, 0.6, 0.5)]);
+    let drawn = rig.mask(lab::RIGHT);
+    rig.send(LabelsCommand::SetReview(Review::Done));
+    rig.clicks(&["Open", "Export masks…"]);
+    rig.clicks(&["PNG"]);
+    rig.shoot("export-forms");
+    let folder = rig.data.join("pictures");
+    rig.clicks(&["Choose the folder of the export"]);
+    rig.take_to(&folder);
+    assert!(folder.join("train").is_dir());
+    rig.harness.get_all_by_label("Open folder").next().expect("the note opens the folder");
+
+    // The mask is another one when it comes back, and nobody judged the pair.
+    rig.send(LabelsCommand::SetReview(Review::Todo));
+    rig.send(LabelsCommand::ResetMask);
+    assert_ne!(rig.mask(lab::RIGHT), drawn);
+    rig.clicks(&["Open", "Import masks…"]);
+    rig.take_to(&folder);
+    rig.harness.get_by_label("Format: PNG");
+    rig.harness.get_by_label("1 mask new");
+    rig.shoot("import-masks");
+    rig.clicks(&["Import these masks"]);
+    assert_eq!(rig.mask(lab::RIGHT), drawn);
+    rig.shoot("imported");
+    rig.harness.key_press_modifiers(Modifiers::CTRL, Key::Z);
+    rig.harness.step();
+    rig.settle();
+    assert_ne!(rig.mask(lab::RIGHT), drawn, "undo brings back what was");
+
+    // What cannot be read is said in the form, with its place.
+    rig.clicks(&["Open", "Import masks…"]);
+    let empty = rig.data.join("empty");
+    std::fs::create_dir(&empty).unwrap();
+    rig.take_to(&empty);
+    rig.harness.get_by_label_contains("there are no masks here");
+    rig.shoot("import-refused");
+    rig.clicks(&["Close"]);
+    assert!(rig.harness.state().state().export.importing.is_none());
+}

@@ -1,6 +1,7 @@
-//! Masks for training, as the lab's UNet reads them: [`plan`] says what goes where, [`export_masks`] writes it. The studio and
+//! Masks for training, in a form of one's choice: [`plan`] says what goes where, [`export_masks`] writes it. The studio and
 //! `touch2touch masks export` both end here.
 
+pub mod import;
 pub mod pair_files;
 
 mod automatic;
@@ -13,7 +14,7 @@ use strum::{EnumIter, EnumString, IntoStaticStr};
 
 use crate::error::TaskError;
 use crate::io::dataset::Dataset;
-use crate::io::exchange::{self, Content, ExportConfig, ExportEntry, ExportReport, LoadFailure};
+use crate::io::exchange::{self, Content, ExportConfig, ExportEntry, ExportReport, Format, LoadFailure};
 use crate::job::JobCx;
 use crate::labels::{DrawnMask, Labels, PairLabels, Review};
 use touch2touch_core::dataset::{PairId, Split};
@@ -102,6 +103,8 @@ pub struct ExportChoice {
     pub manual_checked: bool,
     /// Decides which pair lands in which part.
     pub seed: u64,
+    /// In which form.
+    pub format: Format,
 }
 
 /// Pairs and choices of an export.
@@ -184,6 +187,7 @@ impl Plan {
 
 fn split_of(dataset: &Dataset, choice: ExportChoice) -> ExportConfig {
     ExportConfig {
+        format: choice.format,
         seed: choice.seed,
         by_tool: choice.by_tool,
         held_out_in_train: choice.test_in_train,
@@ -231,7 +235,7 @@ pub fn plan(dataset: &Dataset, masks: &DrawnMasks<'_>, setup: &ExportSetup) -> R
     Ok(plan)
 }
 
-/// Writes masks as [`plan`] says, and reads them back by its rules. Without `automatic`, only masks
+/// Writes masks as [`plan`] says, and reads them back by the rules of their form. Without `automatic`, only masks
 /// drawn by hand can be written.
 ///
 /// # Errors

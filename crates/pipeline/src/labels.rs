@@ -254,6 +254,12 @@ impl DrawnMask {
         Arc::make_mut(&mut self.marks).replace(Arc::make_mut(&mut self.mask), new, by, keep_manual)
     }
 
+    /// Takes another mask over with what it ignores; see [`Marks::take_over`].
+    pub fn take_over(&mut self, new: &Mask, ignored: Option<&Mask>, by: Provenance, keep_manual: bool) -> [usize; 2] {
+        let (mask, marks) = (Arc::make_mut(&mut self.mask), Arc::make_mut(&mut self.marks));
+        marks.take_over(mask, new, ignored, by, keep_manual)
+    }
+
     /// Cleans it up; whether anything changed. What changes nothing leaves no trace. Sizes are those of the rig's depth
     /// images.
     pub fn clean(&mut self, clean_up: CleanUp, rig: &Rig) -> bool {

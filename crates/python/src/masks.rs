@@ -11,6 +11,7 @@ use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::label::{CleanUp, Drawing};
 use touch2touch_core::rig::{PadId, Rig};
 use touch2touch_pipeline::export::{self, Automatic, DrawnMasks, ExportChoice, ExportSetup, Which};
+use touch2touch_pipeline::io::exchange::Format;
 use touch2touch_pipeline::labels::Review;
 use touch2touch_pipeline::masks::label_pair::{Begin, LabelSetup, label_pair};
 use touch2touch_pipeline::masks::propose::ProposalSource;
@@ -116,19 +117,20 @@ fn planar((theta_rad, y_m, z_m): (f64, f64, f64)) -> PyResult<PlanarPose> {
     finite.then_some(PlanarPose { theta_rad, y_m, z_m }).ok_or_else(|| refused("pose: it must be of finite numbers"))
 }
 
-/// Writes masks for training into a folder (empty, missing, or a previous export) as the lab's UNet loader reads it, and checks
-/// what was written by its rules: the function behind `touch2touch masks export`. How many went to each part, as a dictionary.
+/// Writes masks for training into a folder (empty, missing, or a previous export), and checks what was written by the rules of its
+/// form: the function behind `touch2touch masks export`. How many went to each part, as a dictionary.
 ///
-/// `pairs`: "done", "begun" or "all", for which
+/// `format`: "lab" (a folder as the lab's UNet loader reads it), or as the verb has it. `pairs`: "done", "begun" or "all", for which
 /// `recipe` makes the masks that nobody drew. `test_in_train`: pairs that the data set keeps for tests are divided like the rest.
 /// `by_tool`: all pairs of a tool go to one part. `manual_checked`: only pixels that a person painted count. `seed`: of the division.
 #[pyfunction]
-#[pyo3(signature = (data, out, *, pairs="done", test_in_train=false, by_tool=false, manual_checked=false, seed=0, recipe=None, progress=None))]
+#[pyo3(signature = (data, out, *, format=None, pairs="done", test_in_train=false, by_tool=false, manual_checked=false, seed=0, recipe=None, progress=None))]
 #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
 pub(crate) fn export_masks<'py>(
     py: Python<'py>,
     data: &Bound<'py, PyAny>,
     out: PathBuf,
+    format: Option<&str>,
     pairs: &str,
     test_in_train: bool,
     by_tool: bool,
@@ -138,10 +140,12 @@ pub(crate) fn export_masks<'py>(
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let data = dataset_of(py, data)?;
+    let formats = Format::iter().map(|format| (format.key(), format));
+    let format = format.map(|name| choice("format", name, formats)).transpose()?.unwrap_or_default();
     let which = choice("pairs", pairs, Which::iter().map(|which| (which.key(), which)))?;
     let setup = ExportSetup {
         pairs: Some(data.get().ids.iter().map(|id| PairId(*id as u32)).collect()),
-        choice: ExportChoice { which, test_in_train, by_tool, manual_checked, seed },
+        choice: ExportChoice { which, test_in_train, by_tool, manual_checked, seed, format },
     };
     let recipe = given_or(py, recipe, "measured")?;
     let (plan, _) = watched(py, progress, |process, cx| {

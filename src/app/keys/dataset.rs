@@ -1,5 +1,6 @@
 //! Keys of what is of a whole data set, or of a pair before anything is made of it.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::super::keys::{DatasetSeq, Revision};
@@ -33,6 +34,28 @@ pub struct MaskPlanKey {
     pub choice: ExportChoice,
     /// The last change of the document.
     pub revision: Revision,
+}
+
+/// The plan of an import, over what is drawn and marked now.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct ImportPlanKey {
+    /// The data set.
+    pub dataset: DatasetSeq,
+    /// The import that is asked about.
+    pub form: ImportForm,
+    /// The last change of the document.
+    pub revision: Revision,
+}
+
+/// An import of masks that is asked about: what it would change is said before anything changes.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct ImportForm {
+    /// The folder or file.
+    pub from: PathBuf,
+    /// True where what was painted by hand is replaced as well.
+    pub over_drawn: bool,
+    /// The number of the asking: files may be others than at the one before.
+    pub(in crate::app) asked: u64,
 }
 
 /// Everything that decides what is said of the data set.

@@ -1,6 +1,6 @@
 //! The choices of what is taken away.
 
-use super::super::keys::ImprintSource;
+use super::super::keys::{ImportForm, ImprintSource};
 use touch2touch_pipeline::export::ExportChoice;
 use touch2touch_pipeline::still::space::{Ground, SpacePane, ViewAngles};
 
@@ -11,6 +11,10 @@ pub struct ExportState {
     pub asking_masks: bool,
     /// The contents of the form.
     pub masks: ExportChoice,
+    /// The import of masks that is asked about.
+    pub importing: Option<ImportForm>,
+    /// The number of imports that were asked about.
+    pub(in crate::app) imports: u64,
 }
 
 /// A picture of the selected pair in 3D, as a person asks for it.

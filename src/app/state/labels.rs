@@ -147,6 +147,13 @@ impl Document {
         Some(labels)
     }
 
+    /// Forgets the masks and poses of a pair: they are read again when it is looked at.
+    pub(in crate::app) fn reread(&mut self, name: &str) {
+        self.labels.remove(name);
+        self.stored.remove(name);
+        self.changed = None;
+    }
+
     /// The labels of a pair, if there are any.
     pub fn pair(&self, name: &str) -> Option<&PairLabels> {
         self.labels.get(name)

@@ -23,6 +23,7 @@ use touch2touch_pipeline::compare::deviation::{CloudDifference, Deviation};
 use touch2touch_pipeline::compare::{Beside, Comparison};
 use touch2touch_pipeline::doctor::Fact;
 use touch2touch_pipeline::export::Plan;
+use touch2touch_pipeline::export::import::Import;
 use touch2touch_pipeline::learn::train::TrainPlan;
 use touch2touch_pipeline::masks::propose::Proposal;
 use touch2touch_pipeline::steps::estimate::Estimate;
@@ -73,6 +74,8 @@ macro_rules! table {
         Mask(MaskKey => ContactMask, |found| found.mask.len()) in masks, 32 * MIB;
         /// The plan of an export of masks: what it would write where.
         MaskPlan(MaskPlanKey => Plan, |plan| plan.total() * 128) in mask_plans, MIB;
+        /// The plan of an import of masks: what it would change.
+        ImportPlan(ImportPlanKey => Import, |plan| (plan.changed.len() + plan.unmatched.len() + plan.refused.len()) * 128) in import_plans, MIB;
         /// The distances of an imprint's points from the CAD model.
         Distances(DistancesKey => Distances, |found| found.grid.len() * 8) in distances, 32 * MIB;
         /// A mask that is proposed.

@@ -58,6 +58,9 @@ kinds! {
     /// Something is written to a place that a person named.
     Write, "Write", Files,
         "Stop; what is already written stays";
+    /// Masks are taken over that lie in a form of other programs.
+    Import, "Import masks", Files,
+        "Stop; masks imported so far stay";
     /// A data set is scored.
     Evaluate, "Evaluate", Batch,
         "Stop, and show the scores so far";

@@ -74,6 +74,8 @@ pub enum UiRequest {
     PickTableFolder,
     /// Ask where something is to be written; answer with `ExportCommand::Write`.
     PickOutput(Output),
+    /// Ask for the folder of masks that are imported; answer with `ExportCommand::AskImport`.
+    PickMasks,
     /// Ask for the folder to write labels to that could not be saved; answer with `UnsavedCommand::Elsewhere`.
     PickLabelsFolder,
     /// Close the window.

@@ -22,6 +22,8 @@ pub(crate) enum Purpose {
     File,
     /// The folder that the results table is written to.
     Table,
+    /// The folder of masks that are imported.
+    Masks,
     /// The folder that labels are written to which could not be saved.
     Labels,
     /// A place that something is written to.
@@ -36,7 +38,7 @@ impl Purpose {
         let (named, shown) = (path.to_str().and_then(BuiltIn::named), path.display());
         match self {
             Self::Folder | Self::File if named.is_some() => None,
-            Self::Folder | Self::File => (!path.exists()).then(|| format!("There is nothing at {shown}")),
+            Self::Folder | Self::File | Self::Masks => (!path.exists()).then(|| format!("There is nothing at {shown}")),
             _ if writes_file && path.is_dir() => Some(format!("{shown} is a folder: name a file in it")),
             _ if writes_file => parent
                 .filter(|parent| !parent.is_dir())
@@ -51,6 +53,7 @@ impl Purpose {
             Self::File => "Open a file of a data set",
             Self::Output(output) => output.title(),
             Self::Labels => "Save the labels to a folder",
+            Self::Masks => "Import masks from a folder",
             Self::Table => "Write the results table to a folder",
         }
     }
@@ -105,7 +108,7 @@ impl Dialogs {
             let dialog = rfd::FileDialog::new().set_title(purpose.title());
             let path = match purpose {
                 _ if !possible => None,
-                Purpose::Folder | Purpose::Table | Purpose::Labels => dialog.pick_folder(),
+                Purpose::Folder | Purpose::Table | Purpose::Masks | Purpose::Labels => dialog.pick_folder(),
                 Purpose::File => dialog.pick_file(),
                 Purpose::Output(output) => match output.file_name() {
                     Some(name) => dialog.set_file_name(name).save_file(),
@@ -173,6 +176,7 @@ impl Dialogs {
                     None => "A folder; it is created if missing.".to_owned(),
                 },
                 Purpose::Labels => "A folder on another disk; touch2touch_masks is created in it.".to_owned(),
+                Purpose::Masks => "The folder of an export, one of its splits, or one mask (.png).".to_owned(),
                 _ => "A folder in the lab's layout, a folder of image pairs, or any file in one.".to_owned(),
             };
             ui.label(caption(what, p));
@@ -263,6 +267,7 @@ mod tests {
             (Purpose::Folder, dir.path(), None),
             (Purpose::Folder, &new, Some("nothing at")),
             (Purpose::Folder, Path::new("test-set"), None),
+            (Purpose::Masks, Path::new("test-set"), Some("nothing at")),
             (Purpose::File, &file, None),
             (Purpose::Labels, &new, None),
             (Purpose::Labels, &file, Some("is a file")),

@@ -343,6 +343,7 @@ impl StudioApp {
             UiRequest::PickFile => self.shared.dialogs.open(Purpose::File, ctx),
             UiRequest::PickTableFolder => self.shared.dialogs.open(Purpose::Table, ctx),
             UiRequest::PickOutput(output) => self.shared.dialogs.open(Purpose::Output(output), ctx),
+            UiRequest::PickMasks => self.shared.dialogs.open(Purpose::Masks, ctx),
             UiRequest::PickLabelsFolder => self.shared.dialogs.open(Purpose::Labels, ctx),
             UiRequest::Close => {
                 self.leaving = true;
@@ -525,7 +526,7 @@ impl eframe::App for StudioApp {
             let export = &state.export;
             let place = shortcuts::Place {
                 covered,
-                dialog: export.asking_masks || cx.shared.dialogs.is_waiting(),
+                dialog: export.asking_masks || export.importing.is_some() || cx.shared.dialogs.is_waiting(),
                 labeling: state.is_labeling(),
             };
             let possible = |action: Action| action.command(state).is_some() && shortcuts::fits_pane(action, over);
@@ -560,6 +561,7 @@ impl eframe::App for StudioApp {
             bars::hint(&mut cx, &ctx);
             doctor::panel(&mut cx, &ctx);
             export::masks::form(&mut cx, &ctx);
+            export::import::form(&mut cx, &ctx);
             palette::show(&mut cx, &ctx, &mut self.palette);
             shortcuts::sheet(&mut cx, &ctx, &mut self.shortcuts);
             unsaved::question(&mut cx, &ctx);
@@ -569,6 +571,7 @@ impl eframe::App for StudioApp {
                     Purpose::Folder | Purpose::File => Command::Library(LibraryCommand::Open(Place::Path(path))),
                     Purpose::Output(output) => Command::Export(ExportCommand::Write(output, path)),
                     Purpose::Labels => Command::Labels(LabelsCommand::Unsaved(UnsavedCommand::Elsewhere(path))),
+                    Purpose::Masks => Command::Export(ExportCommand::AskImport(Some(path))),
                     Purpose::Table => Command::Evaluate(EvaluateCommand::Export(path)),
                 });
             }

@@ -72,6 +72,7 @@ fn open_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
             Action::ExportMeasured,
             Action::ExportPredicted,
             Action::ExportMasks,
+            Action::ImportMasks,
             Action::TrainMasks,
             Action::Save,
             Action::Reload,
@@ -81,7 +82,7 @@ fn open_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
             cx.menu_row(ui, action, on);
         }
     });
-    response.on_hover_text("Open a data set, export masks, train on them");
+    response.on_hover_text("Open a data set, export and import masks, train on them");
 }
 
 /// The places that were open before.

@@ -1,5 +1,6 @@
 //! Taking things away: the menu in each pane's title.
 
+pub(crate) mod import;
 pub(crate) mod masks;
 
 use eframe::egui::{self, Ui};

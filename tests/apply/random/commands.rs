@@ -21,7 +21,7 @@ use touch2touch::app::keys::{AmbiguityKey, Preview};
 use touch2touch::app::keys::{
     DatasetSeq, ImprintSource, PairKey, PredictionKey, Registration, Revision, ShiftMode, TouchKey,
 };
-use touch2touch::app::labels::{PairLabels, Review, StrokeIn3d};
+use touch2touch::app::labels::{ImportMasks, PairLabels, Review, StrokeIn3d};
 use touch2touch::app::learn::{AdaptPairs, Learn, LearnForm, Learned, Network};
 use touch2touch::app::library::{Open, Place, ReadTool, Sort};
 use touch2touch::app::predict::{Generate, Refit};
@@ -46,9 +46,11 @@ use touch2touch_core::rig::{PadId, lab};
 use touch2touch_pipeline::compare::subject::Subject;
 use touch2touch_pipeline::doctor::{Cure, Examined, Worth};
 use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::export::import::Import;
 use touch2touch_pipeline::export::{ExportChoice, Which};
 use touch2touch_pipeline::infer::engine::EngineChoice;
 use touch2touch_pipeline::io::dataset::ToolUnit;
+use touch2touch_pipeline::io::exchange::Format;
 use touch2touch_pipeline::io::statistics::ShiftStatistics;
 use touch2touch_pipeline::job::{PreviewPicture, Progress};
 use touch2touch_pipeline::labels::Operation;
@@ -248,13 +250,14 @@ fn registration() -> impl Strategy<Value = Registration> {
 }
 
 fn mask_choice() -> impl Strategy<Value = ExportChoice> {
-    let flags = (any_of::<Which>(), any::<[bool; 3]>(), any::<u64>());
-    flags.prop_map(|(which, [test_in_train, by_tool, manual_checked], seed)| ExportChoice {
+    let flags = (any_of::<Which>(), any::<[bool; 3]>(), any::<u64>(), any_of::<Format>());
+    flags.prop_map(|(which, [test_in_train, by_tool, manual_checked], seed, format)| ExportChoice {
         which,
         test_in_train,
         by_tool,
         manual_checked,
         seed,
+        format,
     })
 }
 
@@ -318,6 +321,9 @@ fn ended() -> impl Strategy<Value = Ended> {
             TaskKind::Generate => Ended::of::<Generate>(Vec::new()),
             TaskKind::Refit => Ended::of::<Refit>((statistics(), None)),
             TaskKind::Write => Ended::of::<Write>(("Something".into(), "/dev/null/folder".into())),
+            TaskKind::Import => {
+                Ended::of::<ImportMasks>(Import { new: 1, changed: vec![name.to_owned()], ..Import::default() })
+            }
             TaskKind::Evaluate => Ended::of::<Score>(Arc::new(evaluation())),
             TaskKind::TryModels => Ended::of::<TryModels>(Some(Arc::new(Worth::default()))),
             TaskKind::Examine => Ended::of::<Examine>(Arc::new(Examined::default())),
@@ -470,11 +476,15 @@ draws! {
         1 Published(any::<bool>()),
         1 Start,
         1 All,
+        1 Rank,
         1 Export(Just(PathBuf::from("table"))),
     }
     export: ExportCommand {
         1 AskMasks(any::<bool>()),
         1 SetMasks(mask_choice()),
+        1 AskImport(select(vec![None, Some(PathBuf::from("/dev/null/folder"))])),
+        1 ImportOverHand(any::<bool>()),
+        1 Import,
         1 Place(output()),
         1 Write(output(), Just(PathBuf::from("/dev/null/folder/picture.png"))),
     }

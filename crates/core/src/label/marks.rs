@@ -185,6 +185,43 @@ impl Marks {
         changed
     }
 
+    /// Takes another mask over with what it ignores (`None`: nothing), of provenance `by` where they differ; where `keep_manual`
+    /// is set, what a person painted stays. How many pixels changed, and how many stay although they differ.
+    pub fn take_over(
+        &mut self,
+        mask: &mut Mask,
+        new: &Mask,
+        ignored: Option<&Mask>,
+        by: Provenance,
+        keep_manual: bool,
+    ) -> [usize; 2] {
+        let sizes = [new.size(), self.size(), ignored.map_or(new.size(), Mask::size)];
+        if sizes.iter().any(|size| *size != mask.size()) {
+            return [0; 2];
+        }
+        let by_hand = self.manual_checked();
+        let layer = self.layer(by);
+        let [width, height] = self.size();
+        let mut counts = [0; 2];
+        for pixel in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+            let ignore = ignored.is_some_and(|ignored| ignored[pixel]);
+            // What is ignored is neither contact nor free of it.
+            let contact = new[pixel] && !ignore;
+            if mask[pixel] == contact && self.is_ignored(pixel.0, pixel.1) == ignore {
+                continue;
+            }
+            let stays = keep_manual && by_hand[pixel];
+            counts[usize::from(stays)] += 1;
+            if !stays {
+                mask[pixel] = contact;
+                self.set_ignored(pixel, ignore);
+                self.of[pixel] = layer;
+            }
+        }
+        self.tidy();
+        counts
+    }
+
     /// A mask of ignored pixels without any is none.
     fn tidy(&mut self) {
         if self.ignored.as_ref().is_some_and(|ignored| !ignored.as_slice().contains(&true)) {
@@ -232,6 +269,33 @@ mod tests {
         marks.paint(&mut mask, (&columns(2..4), rect()), Paint::LetThrough, Some(&columns(2..3)), anna());
         assert!(mask == columns(2..3));
         assert!(!marks.replace(&mut mask, &Mask::filled(9, 9, true), anna(), false), "of another size");
+    }
+
+    #[test]
+    fn a_mask_is_taken_over_with_what_it_ignores_and_hand_work_stays_unless_asked() {
+        let mut mask = columns(0..2);
+        let mut marks = Marks::all(mask.size(), Provenance::Truth);
+        marks.paint(&mut mask, (&columns(0..1), rect()), Paint::Contact, None, Provenance::hand("anna"));
+        let imported = || Provenance::Imported { file: "a.png".into() };
+        let (before, new, ignored) = ((mask.clone(), marks.clone()), columns(2..4), columns(3..4));
+        // The first column is by hand and stays, the others differ.
+        assert_eq!(marks.take_over(&mut mask, &new, Some(&ignored), imported(), true), [6, 2]);
+        assert!(mask == Mask::from_fn(4, 2, |x, _| x == 0 || x == 2) && marks.ignored() == Some(&ignored));
+        assert_eq!((marks.at(2, 0), marks.at(0, 0)), (Some(&imported()), Some(&Provenance::hand("anna"))));
+        assert_eq!(
+            marks.take_over(&mut mask, &new, Some(&ignored), imported(), true),
+            [0, 2],
+            "nothing is left to take"
+        );
+        (mask, marks) = before.clone();
+        assert_eq!(marks.take_over(&mut mask, &new, Some(&ignored), imported(), false), [8, 0]);
+        assert!(mask == columns(2..3));
+        // What is ignored no more, and a mask of another size.
+        assert_eq!(marks.take_over(&mut mask, &new, None, imported(), false), [2, 0]);
+        assert!(mask == new && marks.ignored().is_none());
+        (mask, marks) = before.clone();
+        assert_eq!(marks.take_over(&mut mask, &Mask::filled(9, 9, true), None, imported(), false), [0; 2]);
+        assert_eq!((mask, marks), before);
     }
 
     #[test]

@@ -99,6 +99,11 @@ pub enum Provenance {
         /// Provenance of the mask before.
         was: Box<Provenance>,
     },
+    /// A file that another program wrote.
+    Imported {
+        /// Name of the file.
+        file: String,
+    },
     /// Words of a file that knew no other provenance.
     Told {
         /// Words of the file.
@@ -181,6 +186,7 @@ impl Provenance {
             Self::CleanUp { what } => what.kind.name().into(),
             Self::Accepted { person, was } if person.is_empty() => format!("Accepted: {}", was.text()),
             Self::Accepted { person, was } => format!("Accepted by {person}: {}", was.text()),
+            Self::Imported { file } => format!("Imported from {file}"),
             Self::Told { text } => text.clone(),
         }
     }

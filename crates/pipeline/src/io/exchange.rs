@@ -1,12 +1,19 @@
-//! Masks as the lab's UNet training reads them: [`export`] writes them.
+//! Masks in the forms that other programs read and write ([`Format`]): [`export`] writes them, [`list`] finds them again.
 //!
-//! Every export has parts (`train`, `val`, `test`) and a file [`MANIFEST`] that lists what was written. In a part lie
-//! `imgs/STEM.png`, `masks/STEM.png` of 0 and 255, and `ignore/STEM.png`, 255 = ignored, where pixels are. Names of files are
-//! stems (`split.rs`), of which the manifest says pair and finger.
+//! Every export has parts (`train`, `val`, `test`) and a file [`MANIFEST`] that lists what was written. Names of files are
+//! stems (`split.rs`), from which pair and finger can be told again.
 //!
-//! Images are 8-bit gray: `(imprint + 0.0116) / 0.0341 * 255`, cut to whole numbers, limited to 0..255. All are in the raw
-//! orientation of the data set.
+//! | form | image | mask | ignored pixels |
+//! | --- | --- | --- | --- |
+//! | [`Format::Unet`] | `PART/imgs/STEM.png` | `PART/masks/STEM.png`, 0 and 255 | `PART/ignore/STEM.png`, 255 = ignored |
+//! | [`Format::Png`] | | `PART/STEM.png`, 0 and 255 | `PART/STEM.ignore.png` |
+//!
+//! Images are 8-bit gray: `(imprint + 0.0116) / 0.0341 * 255`, cut to whole numbers, limited to 0..255. A file of ignored
+//! pixels is there only where some are. All are in the raw orientation of the data set.
 
+mod format;
+mod found;
+mod read;
 mod split;
 mod unet;
 
@@ -25,6 +32,11 @@ use touch2touch_core::dataset::Problem;
 use touch2touch_core::grid::{DepthMap, Mask};
 use touch2touch_core::rig::{PadId, Rig};
 
+pub use format::Format;
+pub use found::Listed;
+pub(crate) use found::ReadError;
+pub use read::list;
+pub(crate) use split::Stems;
 pub use unet::check_folder;
 
 /// The imprint that becomes 0, meters.
@@ -123,9 +135,11 @@ pub struct ExportEntry {
     pub held_out: bool,
 }
 
-/// Division of an export.
+/// In which form, and how to divide.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExportConfig {
+    /// The form.
+    pub format: Format,
     /// Decides which pair lands where; the same seed and pairs give the same parts.
     pub seed: u64,
     /// True where all pairs of a tool go to the same part; else each pair goes by itself.
@@ -138,7 +152,16 @@ pub struct ExportConfig {
 
 impl Default for ExportConfig {
     fn default() -> Self {
-        Self { seed: 0, by_tool: false, held_out_in_train: false, rig: Rig::lab() }
+        Self {
+            format: Format::default(),
+            seed: 0,
+            val: 0.1,
+            test: 0.1,
+            by_tool: false,
+            test_tools: Vec::new(),
+            held_out_in_train: false,
+            rig: Rig::lab(),
+        }
     }
 }
 
@@ -147,7 +170,7 @@ impl Default for ExportConfig {
 pub struct ExportReport {
     /// Masks in train, val and test.
     pub counts: [usize; 3],
-    /// Pixels below or above the range of the image; they were limited to it.
+    /// Pixels below or above the range of the image; they were limited to it. None where there is no image.
     pub out_of_range_px: usize,
     /// Pixels without measurement; in images they are an imprint of 0.
     pub unmeasured_px: usize,
@@ -158,7 +181,7 @@ struct Manifest {
     format: String,
     version: u32,
     /// The form of the masks.
-    masks: String,
+    masks: Format,
     seed: u64,
     /// Relative path to the SHA-256 of the file.
     files: BTreeMap<String, String>,
@@ -256,18 +279,22 @@ pub fn export(
     let staging = Staging::new(&folder).map_err(|s| io(&parent, "make a folder in", s))?;
     let root = staging.new_content();
     for folder in PARTS.map(|part| root.join(part)) {
-        ["imgs", "masks"].iter().try_for_each(|kind| make_folder(&folder.join(kind)))?;
+        match config.format {
+            Format::Unet => ["imgs", "masks"].iter().try_for_each(|kind| make_folder(&folder.join(kind)))?,
+            Format::Png => make_folder(&folder)?,
+        }
     }
     let mut report = ExportReport::default();
     let source = |entry: &ExportEntry| (entry.pair.clone(), config.rig.pad_key(entry.finger).into_owned());
     let mut manifest = Manifest {
         format: FORMAT.into(),
         version: 1,
-        masks: "unet".into(),
+        masks: config.format,
         seed: config.seed,
         files: BTreeMap::new(),
         stems: stems.iter().cloned().zip(entries.iter().map(source)).collect(),
     };
+    let mut written = BTreeMap::new();
     let mut failures = Vec::new();
     for (i, (stem, &part)) in stems.iter().zip(&parts).enumerate() {
         let mut content = match load(i) {
@@ -291,12 +318,17 @@ pub fn export(
         content.ignored = content.ignored.filter(|ignored| ignored.as_slice().contains(&true));
         report.counts[part] += 1;
         let to = root.join(PARTS[part]);
-        unet::write(&to, stem, &content, &mut report).map_err(|err| meant(err, &root, &folder))?;
+        match config.format {
+            Format::Unet => unet::write(&to, stem, &content, &mut report),
+            Format::Png => format::write_masks(&to, stem, &content),
+        }
+        .map_err(|err| meant(err, &root, &folder))?;
+        written.insert(stem.clone(), digest(&content.mask, content.ignored.as_ref()));
     }
     if !failures.is_empty() {
         return Err(ExportError::Sources { failures });
     }
-    let problems = check_folder(&root).problems;
+    let problems = check_written(&root, config.format, written);
     if !problems.is_empty() {
         return Err(meant(ExportError::Check { problems }, &root, &folder));
     }
@@ -332,6 +364,42 @@ fn meant(err: ExportError, root: &Path, folder: &Path) -> ExportError {
     ExportError::Check { problems }
 }
 
+/// SHA-256 of a mask's size and pixels with its ignored pixels, which tells it from all others.
+fn digest(mask: &Mask, ignored: Option<&Mask>) -> String {
+    let [width, height] = mask.size();
+    let bits = |mask: &Mask| mask.as_slice().iter().map(|&v| u8::from(v)).collect::<Vec<_>>();
+    let ignored = ignored.map(bits).unwrap_or_default();
+    sha256(&[&width.to_le_bytes()[..], &height.to_le_bytes(), &bits(mask), &ignored].concat())
+}
+
+/// Reads what was written by the rules of its loader: each of `written` (stem to [`digest`]) must be there and the same, and
+/// nothing else.
+fn check_written(root: &Path, format: Format, mut written: BTreeMap<String, String>) -> Vec<Problem> {
+    let problem = |file: &Path, what: String| Problem {
+        file: file.to_owned(),
+        what,
+        hint: "check the disk, and export again".into(),
+    };
+    let mut problems = if format == Format::Unet { check_folder(root).problems } else { Vec::new() };
+    let listing = match list(root, Some(format)) {
+        Ok(listing) => listing,
+        Err(err) => return vec![problem(&err.file, err.what)],
+    };
+    problems.extend(listing.refused.iter().map(|err| problem(&err.file, err.what.clone())));
+    for listed in &listing.masks {
+        let expected = written.remove(&listed.stem);
+        match listed.read() {
+            Err(err) => problems.push(problem(&err.file, err.what)),
+            Ok((mask, ignored)) if expected != Some(digest(&mask, ignored.as_ref())) => {
+                problems.push(problem(&listed.file, format!("the mask of {} reads back differently", listed.stem)));
+            }
+            Ok(_) => {}
+        }
+    }
+    problems.extend(written.into_keys().map(|stem| problem(root, format!("the mask of {stem} is not there"))));
+    problems
+}
+
 /// An existing folder must be empty, or hold exactly what its manifest says.
 fn refuse_foreign(folder: &Path) -> Result<(), ExportError> {
     let mut files = Vec::new();
@@ -363,4 +431,51 @@ fn find(root: &Path, folder: &Path, out: &mut Vec<String>) -> std::io::Result<()
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use strum::IntoEnumIterator as _;
+
+    use super::*;
+    use touch2touch_core::rig::lab;
+
+    /// Another mask, a mask that is gone, and one that nobody wrote are told with their files.
+    #[test]
+    fn what_is_not_what_was_written_is_found_in_every_form() {
+        let dir = tempfile::tempdir().unwrap();
+        let entries: Vec<ExportEntry> = (0..3)
+            .map(|i| ExportEntry { pair: format!("data_{i}"), tool: None, finger: lab::RIGHT, held_out: false })
+            .collect();
+        let mask = |i: usize| Mask::from_fn(9, 7, |x, y| x > i && y > 2);
+        let content = |i: usize| Content {
+            imprint: DepthMap::filled(9, 7, 0.003),
+            mask: mask(i),
+            ignored: (i == 1).then(|| Mask::from_fn(9, 7, |x, _| x == 0)),
+        };
+        for format in Format::iter() {
+            let folder = dir.path().join(format.key());
+            let config = ExportConfig { format, val: 0.0, test: 0.0, ..ExportConfig::default() };
+            export(&folder, &entries, &config, |i| Ok(content(i))).unwrap();
+            let stems = split::stems(&entries, &config.rig);
+            let written = |i: usize| (stems[i].clone(), digest(&mask(i), content(i).ignored.as_ref()));
+            let check = |which: &[usize]| check_written(&folder, format, which.iter().map(|&i| written(i)).collect());
+            assert_eq!(check(&[0, 1, 2]), [], "{format:?}");
+            assert!(check(&[0, 1])[0].what.contains("reads back differently"), "nobody wrote the third");
+            let extra = BTreeMap::from([0, 1, 2].map(written)).into_iter().chain([("gone".to_owned(), String::new())]);
+            let gone = check_written(&folder, format, extra.collect());
+            assert!(gone.len() == 1 && gone[0].what.contains("the mask of gone is not there"), "{gone:?}");
+            let (other, stem) = (format::gray(&mask(5)), &stems[2]);
+            let file = match format {
+                Format::Unet => folder.join(format!("train/masks/{stem}.png")),
+                Format::Png => folder.join(format!("train/{stem}.png")),
+            };
+            crate::io::images::write_gray8(&file, &other).unwrap();
+            let found = check(&[0, 1, 2]);
+            assert!(found.len() == 1 && found[0].file == file, "{format:?}: {found:?}");
+            let err = meant(ExportError::Check { problems: found }, &folder, Path::new("/there"));
+            let name = file.file_name().unwrap().to_str().unwrap();
+            assert!(err.to_string().contains("/there/") && err.to_string().contains(name), "{err}");
+        }
+    }
 }

@@ -185,6 +185,34 @@ pub fn read_gray8(path: &Path) -> Result<Grid<u8>, PictureError> {
     }
 }
 
+/// Reads the levels of a mask: gray, or black and one color, however it is stored (palette, alpha, 16 bits). What is
+/// transparent is black; the one color is 255.
+///
+/// # Errors
+/// [`PictureError::Kind`] for a picture of several colors.
+pub(crate) fn read_mask(path: &Path) -> Result<Grid<u16>, PictureError> {
+    let image = match decode(path)? {
+        DynamicImage::ImageLuma8(image) => {
+            return Ok(grid(image.width(), image.height(), image.into_raw().into_iter().map(u16::from).collect()));
+        }
+        DynamicImage::ImageLuma16(image) => return Ok(grid(image.width(), image.height(), image.into_raw())),
+        other => other,
+    };
+    let colors = image.to_rgba8();
+    let visible = colors.pixels().map(|p| if p.0[3] < 128 { [0; 3] } else { [p.0[0], p.0[1], p.0[2]] });
+    let mut color = None;
+    let level = |pixel: [u8; 3]| {
+        if pixel == [0; 3] {
+            return Some(0);
+        }
+        (*color.get_or_insert(pixel) == pixel).then_some(255)
+    };
+    match visible.map(level).collect() {
+        Some(levels) => Ok(grid(image.width(), image.height(), levels)),
+        None => Err(wrong_kind(path, &image, "gray, or black and one other color")),
+    }
+}
+
 fn wrong_kind(file: &Path, image: &DynamicImage, expected: &'static str) -> PictureError {
     PictureError::Kind { file: file.to_owned(), found: format!("{:?}", image.color()), expected }
 }
@@ -313,5 +341,33 @@ mod tests {
         for cut in [whole.len() - 1, whole.len() / 2, 30, 3] {
             assert_eq!(sound(&whole[..cut]), (None, 0), "{cut}");
         }
+    }
+
+    #[test]
+    fn a_mask_is_the_same_however_it_is_stored() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("m.png");
+        let on = |i: usize| i.is_multiple_of(3);
+        let store = |pixel: &dyn Fn(bool) -> Vec<u8>, kind| {
+            let bytes: Vec<u8> = (0..12).flat_map(|i| pixel(on(i))).collect();
+            encode(&path, &bytes, [4, 3], kind).unwrap();
+            read_mask(&path).map(|levels| levels.as_slice().iter().map(|&v| v > 0).collect::<Vec<_>>())
+        };
+        let level = |of: [u8; 2]| move |on: bool| vec![of[usize::from(on)]];
+        let want: Vec<bool> = (0..12).map(on).collect();
+        assert_eq!(store(&level([0, 255]), ExtendedColorType::L8).unwrap(), want);
+        assert_eq!(store(&level([0, 1]), ExtendedColorType::L8).unwrap(), want);
+        let wide = |on: bool| u16::from(on).to_ne_bytes().to_vec();
+        assert_eq!(store(&wide, ExtendedColorType::L16).unwrap(), want);
+        // As palettes and layers come out of a decoder.
+        let colors = |of: [[u8; 4]; 2], n: usize| move |on: bool| of[usize::from(on)][..n].to_vec();
+        let red = colors([[0, 0, 0, 255], [128, 0, 0, 255]], 3);
+        assert_eq!(store(&red, ExtendedColorType::Rgb8).unwrap(), want);
+        let layer = colors([[9, 9, 9, 0], [255, 255, 255, 255]], 4);
+        assert_eq!(store(&layer, ExtendedColorType::Rgba8).unwrap(), want);
+        assert_eq!(store(&|on| vec![255, if on { 255 } else { 0 }], ExtendedColorType::La8).unwrap(), want);
+        let several = colors([[0, 9, 0, 255], [128, 0, 0, 255]], 3);
+        let why = store(&several, ExtendedColorType::Rgb8).unwrap_err().to_string();
+        assert!(why.contains("black and one other color") && why.contains("m.png"), "{why}");
     }
 }

@@ -1,6 +1,7 @@
 //! The form of an export of masks: what goes where is said before anything is written.
 
 use eframe::egui::{self, DragValue, RichText, vec2};
+use strum::IntoEnumIterator as _;
 
 use crate::app::action::Action;
 use crate::app::command::ExportCommand;
@@ -10,6 +11,7 @@ use crate::app::state::Lookup;
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::caption;
 use touch2touch_pipeline::export::{ExportChoice, Which};
+use touch2touch_pipeline::io::exchange::Format;
 
 /// The form, where it is open. It blocks nothing: pairs can be drawn and marked beside it.
 pub(crate) fn form(cx: &mut Cx<'_>, ctx: &egui::Context) {
@@ -29,8 +31,10 @@ pub(crate) fn form(cx: &mut Cx<'_>, ctx: &egui::Context) {
         ui.horizontal(|ui| {
             let write = ui.add_enabled(ready, egui::Button::new("Choose folder…"));
             let write = write.accessible_name("Choose the folder of the export");
-            let tip = "A new or empty folder, or a previous export. {train,val,test}/{imgs,masks} of 8-bit pictures, as the \
-                       lab's UNet training reads them; ignored pixels beside them. Everything is read back and checked";
+            let tip = format!(
+                "A new or empty folder, or a previous export. {}. Everything written is read back and checked.",
+                choice.format.text()
+            );
             if write.on_hover_text(tip).clicked() {
                 cx.push(ExportCommand::Place(Output::Masks));
             }
@@ -57,6 +61,14 @@ fn choices(cx: &Cx<'_>, ui: &mut egui::Ui, choice: &mut ExportChoice) {
             let radio = ui.radio(choice.which == which, text);
             if radio.on_hover_text(format!("{tip}. Never skipped or flagged pairs")).clicked() {
                 choice.which = which;
+            }
+        }
+    });
+    ui.horizontal(|ui| {
+        ui.label(caption("Format", cx.p));
+        for format in Format::iter() {
+            if ui.radio(choice.format == format, format.name()).on_hover_text(format.text()).clicked() {
+                choice.format = format;
             }
         }
     });

@@ -72,6 +72,13 @@ fn stem(entry: &ExportEntry, rig: &Rig) -> String {
     format!("{stem}_{}", rig.pad_key(entry.finger))
 }
 
+/// A stem that another entry has taken, told apart by a hash.
+fn apart(stem: &str, round: u64, entry: &ExportEntry, rig: &Rig) -> String {
+    let digest = hash(round, &format!("{}|{}", entry.pair, rig.pad_key(entry.finger)));
+    let short: String = digest[..4].iter().map(|b| format!("{b:02x}")).collect();
+    format!("{stem}_{short}")
+}
+
 /// File stems, each used once: names that become equal get a hash.
 pub(super) fn stems(entries: &[ExportEntry], rig: &Rig) -> Vec<String> {
     let mut used = HashSet::new();
@@ -82,14 +89,34 @@ pub(super) fn stems(entries: &[ExportEntry], rig: &Rig) -> Vec<String> {
             let mut round = 0;
             // Lower case, because some file systems do not tell capitals apart.
             while !used.insert(stem.to_lowercase()) {
-                let digest = hash(round, &format!("{}|{}", entry.pair, rig.pad_key(entry.finger)));
-                let short: String = digest[..4].iter().map(|b| format!("{b:02x}")).collect();
-                stem = format!("{stem}_{short}");
+                stem = apart(&stem, round, entry, rig);
                 round += 1;
             }
             stem
         })
         .collect()
+}
+
+/// Entries by the stems that an export gives them, for files that come without its list.
+#[derive(Clone, Debug)]
+pub(crate) struct Stems(HashMap<String, Vec<usize>>);
+
+impl Stems {
+    /// All that an export of any of `entries` gives.
+    pub(crate) fn of(entries: &[ExportEntry], rig: &Rig) -> Self {
+        let mut all: HashMap<String, Vec<usize>> = HashMap::new();
+        for (at, entry) in entries.iter().enumerate() {
+            let stem = stem(entry, rig);
+            all.entry(apart(&stem, 0, entry, rig)).or_default().push(at);
+            all.entry(stem).or_default().push(at);
+        }
+        Self(all)
+    }
+
+    /// The entries that a stem may be of: more than one where their names became equal.
+    pub(crate) fn find(&self, stem: &str) -> &[usize] {
+        self.0.get(stem).map_or(&[], Vec::as_slice)
+    }
 }
 
 #[cfg(test)]
@@ -172,5 +199,8 @@ mod tests {
         assert_eq!(out[0], "a_data_1_right");
         assert!(out[1].starts_with("a_data_1_right_") && out[2] == "b_c_x_1____right");
         assert!(out[3].starts_with("A_data_1_right_"));
+        let stems = Stems::of(&list, &Rig::lab());
+        assert_eq!((stems.find(&out[1]), stems.find(&out[2])), (&[1][..], &[2][..]));
+        assert_eq!((stems.find(&out[0]), stems.find("a_data_1")), (&[0, 1][..], &[][..]), "nobody can say which");
     }
 }

@@ -9,31 +9,28 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
+use super::format::gray;
 use super::{Content, ExportError, ExportReport, IGNORED, IMAGE_HI_M, IMAGE_LO_M, PARTS, make_folder};
 use crate::io::images;
 use touch2touch_core::dataset::Problem;
-use touch2touch_core::grid::{DepthMap, Grid, Mask};
+use touch2touch_core::grid::{DepthMap, Grid};
 
-/// Writes an image and its mask into the folders of their part; each is read back.
+/// Writes an image and its mask into the folders of their part.
 pub(super) fn write(part: &Path, stem: &str, content: &Content, report: &mut ExportReport) -> Result<(), ExportError> {
-    let put = |kind: &str, picture: &Grid<u8>| {
-        let file = part.join(kind).join(format!("{stem}.png"));
-        images::write_gray8(&file, picture)?;
-        if images::read_gray8(&file)? == *picture {
-            return Ok(());
-        }
+    let file = |kind: &str| part.join(kind).join(format!("{stem}.png"));
+    let picture = image_from_imprint(&content.imprint, report);
+    let image = file("imgs");
+    images::write_gray8(&image, &picture)?;
+    if images::read_gray8(&image)? != picture {
         let (what, hint) = ("the file reads back differently".into(), "check the disk".into());
-        Err(ExportError::Check { problems: vec![Problem { file, what, hint }] })
-    };
-    put("imgs", &image_from_imprint(&content.imprint, report))?;
-    put("masks", &gray(&content.mask))?;
-    let Some(ignored) = &content.ignored else { return Ok(()) };
-    make_folder(&part.join(IGNORED))?;
-    put(IGNORED, &gray(ignored))
-}
-
-fn gray(mask: &Mask) -> Grid<u8> {
-    mask.map(|&v| if v { 255 } else { 0 })
+        return Err(ExportError::Check { problems: vec![Problem { file: image, what, hint }] });
+    }
+    images::write_gray8(&file("masks"), &gray(&content.mask))?;
+    if let Some(ignored) = &content.ignored {
+        make_folder(&part.join(IGNORED))?;
+        images::write_gray8(&file(IGNORED), &gray(ignored))?;
+    }
+    Ok(())
 }
 
 /// The loader's 8-bit image of an imprint, in 32-bit arithmetic as the lab's script has it.
