@@ -8,7 +8,6 @@ mod python;
 mod random;
 mod recipes;
 mod stills;
-mod verbs;
 mod verdicts;
 
 use std::collections::BTreeMap;
@@ -18,7 +17,6 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 use strum::IntoEnumIterator as _;
-use touch2touch::app::action::Action;
 use touch2touch::app::command::{
     Command, DoctorCommand, ExportCommand, LabelsCommand, LearnCommand, LibraryCommand, Pane, PredictCommand,
     ViewCommand,
@@ -31,7 +29,7 @@ use touch2touch::app::runtime::Runtime;
 use touch2touch::app::services::Services as _;
 use touch2touch::app::services::live::LiveServices;
 use touch2touch::app::settings::prefer;
-use touch2touch::app::settings::{MaskChoice, MaskSettings, MaskSource, MaskTool, Versus, VersusMode};
+use touch2touch::app::settings::{MaskChoice, MaskSettings, MaskSource, Versus, VersusMode};
 use touch2touch::app::state::{Lookup, State};
 use touch2touch::app::{export, results};
 use touch2touch_core::dataset::PairId;
@@ -48,105 +46,6 @@ use touch2touch_pipeline::io::images;
 use touch2touch_pipeline::labels::Labels;
 
 use crate::support::run;
-
-/// How an action is had from the command line.
-enum How {
-    /// By these arguments, which must parse.
-    Verb(&'static [&'static str]),
-    /// Not at all, because it only changes what the window shows or prefers, or moves about in it.
-    Window,
-    /// By options of the verbs that compute: what the window prefers, they are told.
-    Options(&'static [&'static str]),
-    /// It takes back, stops or repeats: a verb is stopped by Ctrl-C and repeated by running it again.
-    Shell,
-}
-
-/// A drawing in 3D, as the journal has it.
-const IN_3D: &str = r#"{"tool": "brush", "radius_px": 9, "points": [[99, 99]], "sight": {"clip_from_grasp":
-    [9, 0, 0, 0, 0, 9, 0, 0, 0, 0, 0, -1, 0, 0, 0.01, 0.2], "size_px": [400, 300], "layers": "all"}}"#;
-
-/// A new action does not compile until it is said here how it is had from the command line.
-fn how(action: Action) -> How {
-    use Action as A;
-    use How::{Options, Shell, Verb, Window};
-    match action {
-        A::OpenFolder | A::OpenDemo | A::Reload => Verb(&["doctor", "demo"]),
-        A::AboutData => Verb(&["doctor", "demo"]),
-        A::Follow => Verb(&["watch", "folder"]),
-        // Labels are on the disk as soon as a verb ends.
-        A::Save => Shell,
-        A::ExportMeasured => Verb(&["export", "demo", "--pair", "a", "--out", "folder"]),
-        A::ExportPredicted => Verb(&["export", "demo", "--pair", "a", "--imprint", "predicted", "--out", "folder"]),
-        A::ExportMasks => Verb(&["masks", "export", "demo", "--out", "folder"]),
-        A::ImportMasks => Verb(&["masks", "import", "demo", "--from", "folder"]),
-        A::Generate => Verb(&["generate", "demo", "--out", "folder"]),
-        A::GenerateNewSeed | A::LockSeed => Options(&["generate", "demo", "--out", "folder", "--seed", "7"]),
-        A::FitPairs => Verb(&["adapt", "demo", "--out", "folder"]),
-        A::UseFit => Options(&["generate", "demo", "--out", "folder", "--bundle", "fitted"]),
-        A::TrainMasks | A::StartTraining => Verb(&["masks", "train", "demo", "--minutes", "10", "--out", "trained"]),
-        A::UseTrained => Options(&["label", "demo", "--pair", "a", "--adopt", "--mask-bundle", "trained"]),
-        A::EvaluateDataset => Verb(&["evaluate", "demo"]),
-        A::PredictAll => Verb(&["evaluate", "demo"]),
-        A::RankMasks => Verb(&["evaluate", "demo"]),
-        A::ExportTable => Verb(&["evaluate", "demo", "--out", "folder", "--csv", "a.csv"]),
-        A::NextShift => Options(&["pose", "demo", "--imprint", "predicted", "--shift", "raw"]),
-        A::Refit => Verb(&["stats", "demo", "--out", "statistics.json"]),
-        A::FillHoles => Verb(&["label", "demo", "--pair", "a", "--clean", "fill_holes"]),
-        A::LargestIsland => Verb(&["label", "demo", "--pair", "a", "--clean", "largest_island"]),
-        A::SmoothMask => Verb(&["label", "demo", "--pair", "a", "--clean", "smooth=1"]),
-        A::GrowMask => Verb(&["label", "demo", "--pair", "a", "--clean", "grow=1"]),
-        A::ShrinkMask => Verb(&["label", "demo", "--pair", "a", "--clean", "shrink=1"]),
-        A::AdoptAutomatic => Verb(&["label", "demo", "--pair", "a", "--adopt", "--mask", "top_percent"]),
-        A::Propose | A::NextProposal => Verb(&["label", "demo", "--pair", "a", "--propose", "cad_registered"]),
-        A::ResetMask => Verb(&["label", "demo", "--pair", "a", "--remove-mask"]),
-        A::DoneAndNext => Verb(&["label", "demo", "--pair", "a", "--review", "done"]),
-        A::Flag => Verb(&["label", "demo", "--pair", "a", "--review", "flagged"]),
-        A::Skip => Verb(&["label", "demo", "--pair", "a", "--review", "skip"]),
-        A::MarkTodo => Verb(&["label", "demo", "--pair", "a", "--review", "todo"]),
-        A::AcceptMeasuredPose => Verb(&["label", "demo", "--pair", "a", "--accept", "measured"]),
-        A::AcceptPredictedPose => Verb(&["label", "demo", "--pair", "a", "--accept", "predicted"]),
-        A::Accept => Verb(&["label", "demo", "--pair", "a", "--accept", "measured", "--pose", "-3,0,1.5"]),
-        A::RunPose => Verb(&["pose", "demo"]),
-        A::TryTools => Verb(&["pose", "demo", "--tool", "any"]),
-        A::IcpFromHere => Verb(&["pose", "demo", "--start", "10,0,-2"]),
-        A::OwnStarts => Verb(&["pose", "demo", "--pair", "a"]),
-        A::NextPoseEngine => Options(&["pose", "demo", "--engine", "lab_icp"]),
-        // Steps, residuals and reasons are in the report of the registration.
-        A::StepBack | A::StepForward | A::FirstStep | A::LastStep | A::PlaySteps | A::PinStep | A::Correspondences => {
-            Options(&["pose", "demo", "--trace", "--json"])
-        }
-        A::Distances | A::NextLayer => Options(&["pose", "demo", "--trace", "--json"]),
-        A::CancelJobs | A::Undo | A::Redo => Shell,
-        A::PreviousPair | A::NextPair | A::TenBack | A::TenForward | A::FirstPair | A::LastPair => Window,
-        A::NextUnfinished | A::NextWorst | A::OtherFinger | A::BothFingers | A::FindPair => Window,
-        A::Brush | A::Eraser | A::Lasso | A::Polygon | A::RectangleTool | A::Wand => Verb(&[
-            "label",
-            "demo",
-            "--pair",
-            "a",
-            "--draw",
-            r#"{"tool": "lasso", "paint": "contact", "points": [[9, 9], [30, 9], [9, 30]]}"#,
-        ]),
-        A::PaintIn3d | A::PaintLayers => Verb(&["label", "demo", "--pair", "a", "--draw", IN_3D]),
-        A::PanTool | A::LastTool | A::PaintIgnore | A::LetThrough | A::BrushSmaller | A::BrushLarger => Window,
-        A::MaskVisible | A::MaskOutline | A::MaskFainter | A::MaskStronger => Window,
-        A::PoseTool | A::RevertHand | A::MeasureDistance | A::MeasureAngle => Window,
-        A::NudgeLeft | A::NudgeRight | A::NudgeUp | A::NudgeDown | A::TurnLeft | A::TurnRight => Window,
-        A::LockRange | A::RangeOnce | A::ResetRange | A::Fit | A::BothClouds | A::LinkCameras | A::Footprint => Window,
-        A::CompareMode | A::SwapCompared => {
-            Options(&["compare", "demo", "--pair", "a", "--a", "prediction:seed=7", "--b", "measured"])
-        }
-        A::WindowOnly | A::MembraneSurface | A::EyeDome | A::Parallel | A::CopyCamera => Window,
-        A::CameraLeft | A::CameraRight | A::CameraFront | A::CameraBack | A::CameraTop | A::CameraBottom => Window,
-        A::CameraOblique | A::NextSides | A::NextGel | A::SwitchTheme => Window,
-        A::InspectWorkspace | A::AlignWorkspace | A::LabelWorkspace | A::EvaluateWorkspace | A::AdaptWorkspace => {
-            Window
-        }
-        A::ResetWorkspace | A::MaximizePane | A::Fullscreen | A::Screenshot | A::CopyHovered => Window,
-        A::SavePane | A::CopyPane => Window,
-        A::Palette | A::ShortcutSheet | A::ResetSettings => Window,
-    }
-}
 
 #[test]
 pub(crate) fn what_is_said_of_a_data_set_is_the_same_in_the_panel_and_by_the_verb() {
@@ -177,21 +76,6 @@ pub(crate) fn what_is_said_of_a_data_set_is_the_same_in_the_panel_and_by_the_ver
         let Some(verb) = cure.verb() else { continue };
         touch2touch::headless::check_command(verb.split(' ')).unwrap_or_else(|err| panic!("{verb}: {err}"));
     }
-}
-
-#[test]
-fn every_action_that_computes_or_writes_has_its_verb() {
-    let (mut verbs, mut all) = (0, 0);
-    for action in Action::iter() {
-        all += 1;
-        let (How::Verb(arguments) | How::Options(arguments)) = how(action) else { continue };
-        verbs += 1;
-        let words = std::iter::once(&"touch2touch").chain(arguments).copied();
-        if let Err(err) = touch2touch::headless::check_command(words) {
-            panic!("{action:?}: {arguments:?}: {err}");
-        }
-    }
-    assert!(verbs > 35 && all > verbs, "{verbs} of {all}");
 }
 
 /// The studio on a place, run until nothing is left to compute.
