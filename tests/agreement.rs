@@ -29,7 +29,7 @@ use touch2touch::app::runtime::Runtime;
 use touch2touch::app::services::Services as _;
 use touch2touch::app::services::live::LiveServices;
 use touch2touch::app::settings::prefer;
-use touch2touch::app::settings::{MaskChoice, MaskSettings, MaskSource, Versus, VersusMode};
+use touch2touch::app::settings::{MaskChoice, MaskSettings, MaskSource, MaskTool, Versus, VersusMode};
 use touch2touch::app::state::{Lookup, State};
 use touch2touch::app::{export, results};
 use touch2touch_core::dataset::PairId;
