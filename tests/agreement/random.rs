@@ -4,7 +4,6 @@
 pub(super) mod compared;
 pub(super) mod files;
 pub(super) mod labels;
-#[cfg(feature = "tune")]
 pub(super) mod learned;
 pub(super) mod posed;
 pub(super) mod tables;
