@@ -29,3 +29,4 @@ mod support;
 mod training;
 mod ui;
 mod unsound;
+mod words;
