@@ -189,7 +189,7 @@ fn can_use(state: &State, network: Network) -> Option<Command> {
 
 /// True where the measured imprints of all pairs can be scored now.
 fn can_rank(state: &State) -> bool {
-    results::setup_of_all(state).is_some()
+    results::evaluation_setup(state).is_some()
         && export::can_draw(state)
         && state.tasks.of_kind(TaskKind::Evaluate).is_none()
 }
@@ -209,13 +209,11 @@ fn nudge(state: &State, axis: PoseAxis, steps: f64) -> Option<Command> {
     when(in_hand(state), WorkbenchCommand::Nudge(axis, steps * axis.step()))
 }
 
-/// The command of Escape in the 3D panes: it gives up the pose in hand, then a measurement, then the point read.
+/// The command of Escape in the 3D panes: it gives up the pose in hand, then the tool, then the point read.
 fn escape(state: &State) -> Option<WorkbenchCommand> {
     let bench = &state.workbench;
     if bench.hand.is_some() {
         Some(WorkbenchCommand::RevertHand)
-    } else if !bench.marks.is_empty() {
-        Some(WorkbenchCommand::ClearMarks)
     } else if bench.tool != SceneTool::Look {
         Some(WorkbenchCommand::SetTool(SceneTool::Look))
     } else {

@@ -107,10 +107,8 @@ macro_rules! actions {
             state => when(learn::can_start(state, Network::Generator), LearnCommand::Start(Network::Generator));
         UseFit, Generate, "Use the fitted model", "Predicts with the model that was fitted to these pairs", [],
             state => can_use(state, Network::Generator);
-        EvaluateDataset, Generate, "Evaluate the data set", "Scores the chosen generators on the open data set, as the paper's results table does", [],
-            state => when(results::evaluation_setup(state).is_some() && state.tasks.of_kind(TaskKind::Evaluate).is_none(), EvaluateCommand::Start);
         PredictAll, Generate, "Predict all", "Predicts and scores every pair of the open data set with the chosen generators; what was scored before is not computed again", [],
-            state => when(can_rank(state), EvaluateCommand::All);
+            state => when(can_rank(state), EvaluateCommand::Start);
         RankMasks, Generate, "Rank by uncertainty", "Sorts the pairs by how unsure the mask model is, most unsure first", [],
             state => when(can_rank(state), EvaluateCommand::Rank);
         ExportTable, Generate, "Export the results table…", "Writes the results table as CSV and JSON", [],
@@ -223,10 +221,6 @@ macro_rules! actions {
             state => accept_shown(state);
         RevertHand, Pose, "Drop the pose by hand", "Goes back to the registered pose", [],
             state => when(state.workbench.hand.is_some(), WorkbenchCommand::RevertHand);
-        MeasureDistance, Pose, "Measure distance", "Distance between two points you click in 3D", [plain(K::Y)],
-            state => toggle(state, SceneTool::Distance);
-        MeasureAngle, Pose, "Measure angle", "Angle at the second of three points you click in 3D", [shift(K::Y)],
-            state => toggle(state, SceneTool::Angle);
         StepBack, Pose, "Previous step", "Previous step of the registration", [plain(K::Comma)],
             state => inspect(state, |s| s.at > 0, InspectCommand::By(-1));
         StepForward, Pose, "Next step", "Next step of the registration", [plain(K::Period)],
@@ -429,7 +423,7 @@ impl Action {
             Self::Generate => "predict prediction run inference diffusion",
             Self::FitPairs => "adapt calibrate tune finetune train",
             Self::TrainMasks | Self::StartTraining => "unet learn finetune tune segmentation",
-            Self::EvaluateDataset => "score metrics benchmark results table",
+            Self::PredictAll => "score metrics benchmark results table evaluate",
             Self::ExportTable => "csv json save results",
             Self::CancelJobs => "stop abort interrupt",
             Self::NextShift => "depth offset gain millimeters scale",
@@ -446,7 +440,6 @@ impl Action {
             Self::TryTools => "which tool wrong cad model identify rank recognize",
             Self::NextPoseEngine => "icp register method algorithm",
             Self::PoseTool => "hand gizmo drag manual move",
-            Self::MeasureDistance | Self::MeasureAngle => "ruler mm length degrees",
             Self::LockRange | Self::RangeOnce | Self::ResetRange => "colorbar colormap scale limits minimum maximum mm",
             Self::Fit => "zoom center home view",
             Self::EyeDome => "edl shadow",

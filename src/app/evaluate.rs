@@ -1,6 +1,5 @@
 //! The room of the results table.
 
-pub(crate) use super::state::evaluate::GRASPS;
 pub use super::state::evaluate::ScoreChoice;
 
 use std::path::PathBuf;
@@ -23,14 +22,10 @@ use touch2touch_pipeline::scores::evaluate::{self, Evaluation, Setup};
 pub enum EvaluateCommand {
     /// Gives a generator a row, or none.
     Choose(Arc<str>, bool),
-    /// The number of grasps of each tool.
-    Grasps(Option<usize>),
     /// Shows what was published, or not.
     Published(bool),
-    /// Scores the open data set.
+    /// Predicts and scores every pair of the open data set.
     Start,
-    /// Predicts and scores every pair of it.
-    All,
     /// Scores the measured imprints of every pair, so that the most uncertain masks are known; runs no generator.
     Rank,
     /// Writes the table into a folder.
@@ -46,10 +41,8 @@ pub(super) fn step(state: &mut State, command: EvaluateCommand, effects: &mut Ve
                 state.table.left_out.insert(bundle);
             }
         }
-        EvaluateCommand::Grasps(grasps) => state.table.grasps_per_tool = grasps.map(|n| n.max(1)),
         EvaluateCommand::Published(shown) => state.table.published = shown,
-        EvaluateCommand::Start => start(state, results::evaluation_setup(state), "Evaluate", effects),
-        EvaluateCommand::All => start(state, results::setup_of_all(state), "Predict all of", effects),
+        EvaluateCommand::Start => start(state, results::evaluation_setup(state), "Predict all of", effects),
         EvaluateCommand::Rank => rank(state, effects),
         EvaluateCommand::Export(folder) => {
             let Some(evaluation) = state.table.result.clone() else { return };
@@ -67,7 +60,7 @@ pub(super) fn step(state: &mut State, command: EvaluateCommand, effects: &mut Ve
 
 /// Has the measured imprints of every pair scored, and the list ordered by how unsure the mask model is of them.
 fn rank(state: &mut State, effects: &mut Vec<Effect>) {
-    let setup = results::setup_of_all(state).map(|setup| Setup { bundles: Vec::new(), ..setup });
+    let setup = results::evaluation_setup(state).map(|setup| Setup { bundles: Vec::new(), ..setup });
     start(state, setup, "Rank the masks of", effects);
     let measured = Some(evaluate::MEASURED.into());
     state.table.chosen = ScoreChoice { source: measured, metric: Some(Metric::Unsure), best_first: false };

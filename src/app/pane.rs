@@ -144,7 +144,7 @@ macro_rules! panes {
                 Masks { "Mask", "Edit the contact mask", Form, needs [Masks], at [Label Right(1)] }
             }
             results { Results {
-                "Results", "The paper's results table of the open data set", Form, needs [],
+                "Results", "Scores of every generator, and of every pair", Form, needs [],
                 at [Evaluate Top(1)]
             } }
             adapt { Adapt {
@@ -152,9 +152,6 @@ macro_rules! panes {
                 Form, needs [Training],
                 at [Adapt Top(1)]
             } }
-            table {
-                Table { "All metrics", "The scores of all pairs by every source", Form, needs [], at [Evaluate Top(1)] }
-            }
             log { Log {
                 "Log", "Messages so far", Form, needs [],
                 at [Inspect Right(2), Align Right(2), Label Right(2), Evaluate Right(1), Adapt Right(1)]

@@ -61,7 +61,7 @@ pub(crate) use registration::{inspected_in, run_key, want_deviation, want_inspec
 pub use sample::{ambiguity, bubble, gelslim, sample, thumbnail, touch, truth};
 pub(crate) use sample::{gone, want_ambiguity, want_thumbnails};
 pub use scores::evaluated;
-pub(crate) use scores::{evaluation_setup, setup_of_all};
+pub(crate) use scores::evaluation_setup;
 pub use shown::{chosen, imprint_key, shown, worked_on};
 pub(crate) use shown::{imprint_of, pick, picked};
 pub use tool::{tool, tool_name};

@@ -1,8 +1,6 @@
-//! The room of the workbench: layers, poses by hand, measuring.
+//! The room of the workbench: layers, poses by hand, points read.
 
 pub use super::state::workbench::{Layer, ManualTry, Picked, SceneTool, Workbench};
-
-use glam::DVec3;
 
 use super::effect::Effect;
 use super::inspect::InspectCommand;
@@ -42,10 +40,6 @@ pub enum WorkbenchCommand {
     RevertHand,
     /// Reads a point, or no longer.
     Pick(Option<Picked>),
-    /// Adds a point to the measurement; after the last one it begins anew.
-    Mark(ImprintSource, DVec3),
-    /// Forgets the measurement.
-    ClearMarks,
 }
 
 pub(super) fn step(state: &mut State, command: WorkbenchCommand, effects: &mut Vec<Effect>) {
@@ -62,7 +56,6 @@ pub(super) fn step(state: &mut State, command: WorkbenchCommand, effects: &mut V
             }
             let bench = &mut state.workbench;
             bench.tool = tool;
-            bench.marks.clear();
             if tool != SceneTool::Pose {
                 bench.hand = None;
             }
@@ -82,18 +75,6 @@ pub(super) fn step(state: &mut State, command: WorkbenchCommand, effects: &mut V
         WorkbenchCommand::AcceptHand => accept(state, effects),
         WorkbenchCommand::RevertHand => bench.hand = None,
         WorkbenchCommand::Pick(picked) => bench.picked = picked,
-        WorkbenchCommand::Mark(side, point) => {
-            let needed = bench.tool.marks();
-            if needed == 0 || !point.is_finite() {
-                return;
-            }
-            // A measurement is of one view; a complete one makes room for the next.
-            if bench.marks.len() >= needed || bench.marks.first().is_some_and(|(of, _)| *of != side) {
-                bench.marks.clear();
-            }
-            bench.marks.push((side, point));
-        }
-        WorkbenchCommand::ClearMarks => bench.marks.clear(),
     }
 }
 

@@ -10,6 +10,5 @@ pub(crate) mod metrics;
 pub(crate) mod results;
 pub(crate) mod scene;
 pub(crate) mod settings_pane;
-pub(crate) mod table;
 pub(crate) mod timemachine;
 pub(crate) mod versus;

@@ -25,7 +25,7 @@ impl Action {
             Workspace::Align => self.group() == Group::Pose,
             Workspace::Label => self.group() == Group::Mask || matches!(self, Self::NextUnfinished | Self::RankMasks),
             Workspace::Evaluate => {
-                matches!(self, Self::EvaluateDataset | Self::PredictAll | Self::ExportTable | Self::NextWorst)
+                matches!(self, Self::PredictAll | Self::ExportTable | Self::NextWorst)
             }
             Workspace::Adapt => {
                 matches!(self, Self::FitPairs | Self::UseFit | Self::TrainMasks | Self::StartTraining)
@@ -63,7 +63,7 @@ impl Action {
             || matches!(self, A::LinkCameras | A::NextLayer | A::BothClouds);
         look || self.is_nudge()
             || matches!(self, A::PoseTool | A::IcpFromHere | A::Accept | A::RevertHand)
-            || matches!(self, A::MeasureDistance | A::MeasureAngle | A::PlaySteps | A::PaintIn3d | A::PaintLayers)
+            || matches!(self, A::PlaySteps | A::PaintIn3d | A::PaintLayers)
     }
 
     /// True where it is about the steps of a registration.

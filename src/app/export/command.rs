@@ -69,17 +69,14 @@ pub fn equivalent_words(state: &State, pane: Pane) -> Option<Vec<String>> {
                 .then(recipe_shown(state, ImprintSource::Predicted).words(Stage::Pose))
         }
         (Pane::Masks, _) => of_pair("label")?,
-        (Pane::Results | Pane::Table, _) => {
+        (Pane::Results, _) => {
             let mut words = verb("evaluate");
             for (bundle, _) in results::evaluated(state).filter(|(_, chosen)| *chosen) {
                 words = words.option("--bundle", bundle.origin.path().display());
             }
             // Each bundle draws with its own choices.
             let recipe = Recipe { generator: None, ..recipe::in_force(state, ImprintSource::Predicted) };
-            words
-                .option_if("--grasps", state.table.grasps_per_tool)
-                .word_if(state.table.published, "--paper")
-                .then(recipe.words(Stage::Pose))
+            words.word_if(state.table.published, "--paper").then(recipe.words(Stage::Pose))
         }
         (Pane::Adapt, _) if state.learn.shown == Network::Generator => {
             let (setup, form) = (learn::adapt_setup(state)?, state.learn.form);

@@ -13,16 +13,16 @@ use crate::app::evaluate::ScoreChoice;
 use crate::app::labels::Review;
 use crate::app::library::{Sort, short_name};
 use crate::app::results;
-use crate::app::scores::{Grade, SourceScores};
 use crate::app::tasks::TaskKind;
 use crate::ui::parts::cx::Cx;
-use crate::ui::parts::theme::{Palette, SMALL, caption};
+use crate::ui::parts::theme::{Palette, SMALL, caption, grade_color};
 use crate::ui::parts::widget::cut::cut_in_the_middle;
 use crate::ui::parts::widget::empty;
 use crate::ui::parts::widget::texture::depth_image;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::evaluation::Metric;
 use touch2touch_core::units::counted;
+use touch2touch_core::verdict::Grade;
 
 /// Height of a row, points.
 const ROW: f32 = 40.0;
@@ -252,39 +252,36 @@ fn list(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
     }
 }
 
-/// The progress of the scoring.
+/// The button that scores all pairs, or how far that is; the bar at the bottom of the window stops it.
 fn scoring(cx: &mut Cx<'_>, ui: &mut Ui) {
     let total = cx.state.library.pairs().len();
     let scored = cx.state.table.by().map_or(0, |(source, _)| source.scored);
-    let possible = Action::PredictAll.command(cx.state).is_some();
-    if (possible && scored < total) || cx.state.tasks.of_kind(TaskKind::Evaluate).is_some() {
-        predict_all(cx, ui, scored);
+    // The table of all scores has its own.
+    if cx.state.selection.panes.contains(&Pane::Results) {
+        return;
     }
-}
-
-/// The button that scores all pairs, or how far that is; the bar at the bottom of the window stops it.
-pub(crate) fn predict_all(cx: &mut Cx<'_>, ui: &mut Ui, scored: usize) {
-    let total = cx.state.library.pairs().len();
     ui.horizontal_wrapped(|ui| match cx.state.tasks.of_kind(TaskKind::Evaluate) {
         Some((_, task)) => {
             let text = format!("scoring {} of {}", task.progress.done, task.progress.total);
             ui.label(RichText::new(text).size(SMALL).color(cx.p.accent));
         }
-        None => {
+        None if scored < total && Action::PredictAll.command(cx.state).is_some() => {
             cx.action_button(ui, Action::PredictAll, "Predict all");
             ui.label(caption(format!("{scored} of {total} scored"), cx.p));
         }
+        None => {}
     });
 }
 
-/// The color of a score: by size where that means something on its own, else by how it stands among the others.
-pub(crate) fn score_color(p: &Palette, source: &SourceScores, metric: Metric, value: f64) -> Color32 {
-    match (metric, source.standing(metric, value)) {
-        (Metric::Angle, _) if value.is_nan() => p.wrong,
-        (Metric::Angle, _) => error_color(p, value),
-        (_, Grade::Worst) => p.wrong,
-        (_, Grade::Poor) => p.caution,
-        (_, Grade::Fine) => p.text,
+/// The color of a score, where its size means something on its own: of an angle's error and of a verdict.
+pub(crate) fn score_color(p: &Palette, metric: Metric, value: f64) -> Color32 {
+    match metric {
+        Metric::Angle if value.is_nan() => p.wrong,
+        Metric::Angle => error_color(p, value),
+        Metric::Verdict => {
+            Grade::iter().find(|grade| f64::from(*grade as u8) == value).map_or(p.text, |grade| grade_color(p, grade))
+        }
+        _ => p.text,
     }
 }
 
@@ -379,7 +376,7 @@ fn figure_text(cx: &Cx<'_>, pair: PairId) -> Option<(String, Color32)> {
     let table = &cx.state.table;
     let (source, metric) = table.by()?;
     let value = source.value(pair, metric)?;
-    Some((metric.text(value), score_color(cx.p, source, metric, value)))
+    Some((metric.text(value), score_color(cx.p, metric, value)))
 }
 
 /// The picture of a pair's measured imprint, if it is there.

@@ -6,8 +6,8 @@ mod gizmo;
 mod hands;
 mod layers;
 mod legend;
-mod measure;
 mod overlay;
+mod pick;
 mod steps;
 mod strip;
 mod verdict;
@@ -287,18 +287,17 @@ fn one_side(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, source: ImprintSo
         made_with::show(cx, ui, label, picture, below);
     }
     if let Lookup::Ready(clouds) = lookup {
-        pick(cx, ui, memory, source, &output, clouds);
-        measure::click(cx, memory, source, &output, clouds);
+        point_at(cx, ui, memory, source, &output, clouds);
+        pick::click(cx, memory, source, &output, clouds);
     }
     overlay::show(cx, ui, memory, source, &output, first);
     let rect = output.response.rect;
-    measure::marks(cx, ui, memory, source, &output);
     gizmo::show(cx, ui, memory, source, &output);
     if let Some(clouds) = lookup.shown() {
         draw::show(cx, ui, memory, source, &output, clouds);
     }
     if let Lookup::Ready(clouds) = lookup {
-        measure::card(cx, ui, source, rect, clouds);
+        pick::card(cx, ui, source, rect, clouds);
     }
 }
 
@@ -402,7 +401,7 @@ fn nearest(clouds: &Clouds, camera: &Camera, size: [u32; 2], pointer: glam::DVec
 }
 
 /// The point under the pointer becomes the pixel under the pointer of all images.
-fn pick(cx: &mut Cx<'_>, ui: &Ui, memory: &Memory, source: ImprintSource, output: &SceneOutput, clouds: &Clouds) {
+fn point_at(cx: &mut Cx<'_>, ui: &Ui, memory: &Memory, source: ImprintSource, output: &SceneOutput, clouds: &Clouds) {
     let Some(pointer) = output.pointer else { return };
     if ui.input(|i| i.pointer.delta() == egui::Vec2::ZERO) || output.moved {
         // At rest, or while the view turns, the mark stays where it is.

@@ -65,7 +65,7 @@ pub(crate) fn menu(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane) {
         None if pane.is_of_pair() => &[Action::ExportMeasured, Action::ExportPredicted],
         None => &[],
     };
-    let table: &[Action] = if matches!(pane, Pane::Results | Pane::Table) { &[Action::ExportTable] } else { &[] };
+    let table: &[Action] = if pane == Pane::Results { &[Action::ExportTable] } else { &[] };
     for action in sides.iter().chain(table).copied() {
         if cx.menu_row(ui, action, false).clicked() {
             ui.close();

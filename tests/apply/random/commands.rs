@@ -467,15 +467,11 @@ draws! {
         1 RevertHand,
         1 Pick(proptest::option::of((source(), finger(), any::<[u16; 2]>())
             .prop_map(|(source, finger, pixel)| Picked { source, finger, pixel }))),
-        1 Mark(source(), point()),
-        1 ClearMarks,
     }
     evaluate: EvaluateCommand {
         1 Choose(Just(Arc::from("gen")), any::<bool>()),
-        1 Grasps(proptest::option::of(0usize..3)),
         1 Published(any::<bool>()),
         1 Start,
-        1 All,
         1 Rank,
         1 Export(Just(PathBuf::from("table"))),
     }

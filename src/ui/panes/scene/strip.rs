@@ -1,4 +1,4 @@
-//! The strip beside the 3D views: views, what is shown, what is measured.
+//! The strip beside the 3D views: views, what is shown, tools.
 
 use eframe::egui::{self, Popup, PopupCloseBehavior, Rect, Ui, UiBuilder, vec2};
 use strum::IntoEnumIterator as _;
@@ -33,7 +33,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, column: Rect) {
     ui.scope_builder(builder, |ui| {
         ui.set_clip_rect(column.intersect(ui.clip_rect()));
         // In a low pane the buttons are lower, so that all are there.
-        const BUTTONS: f32 = 9.0;
+        const BUTTONS: f32 = 6.0;
         ui.spacing_mut().item_spacing.y = 2.0;
         ui.spacing_mut().interact_size.y = ((column.height() - 18.0) / BUTTONS - 2.0).clamp(18.0, icon::SIZE.y);
         views(cx, ui);
@@ -42,8 +42,6 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, column: Rect) {
         switch(cx, ui, Icon::Distance, Action::Distances, layer == Layer::Distance);
         shown(cx, ui);
         line(cx, ui);
-        switch(cx, ui, Icon::Ruler, Action::MeasureDistance, tool == SceneTool::Distance);
-        switch(cx, ui, Icon::Angle, Action::MeasureAngle, tool == SceneTool::Angle);
         switch(cx, ui, Icon::Hand, Action::PoseTool, tool == SceneTool::Pose);
         if cx.state.selection.panes.contains(&Pane::Masks) {
             switch(cx, ui, Icon::BrushIn3d, Action::PaintIn3d, tool == SceneTool::Paint);

@@ -42,7 +42,7 @@ pub(crate) const SCENE: &[(&str, &str)] = &[
     ("Double-click", "center the point; beside all points, or [[fit]]: fit"),
     ("[[camera_left]], [[camera_right]], [[camera_front]], [[camera_top]]", "from left, right, front, top"),
     ("Hover", "cross-hair in the images"),
-    ("Click a point", "read it, or measure with [[measure_distance]] (mm) and [[measure_angle]] (angle)"),
+    ("Click a point", "read it"),
     ("[[pose_tool]]", "pose tool: keys or handles; [[accept]] accepts, [[cancel_jobs]] reverts"),
     ("[[distances]], [[next_layer]]", "distance to the CAD in mm; other colorings"),
     ("[[window_only]], [[parallel]]", "GelSlim window only, parallel projection"),
