@@ -29,7 +29,7 @@ use touch2touch::app::runtime::Runtime;
 use touch2touch::app::services::Services as _;
 use touch2touch::app::services::live::LiveServices;
 use touch2touch::app::settings::prefer;
-use touch2touch::app::settings::{MaskChoice, MaskSettings, MaskSource, MaskTool, Versus, VersusMode};
+use touch2touch::app::settings::{CompareChoice, CompareMode, MaskChoice, MaskSettings, MaskSource, MaskTool};
 use touch2touch::app::state::{Lookup, State};
 use touch2touch::app::{export, results};
 use touch2touch_core::dataset::PairId;
@@ -224,9 +224,9 @@ fn two_predictions_are_compared_by_one_function() {
     let (a, b) = ("prediction:seed=7,shift=raw", "mean:seeds=2");
     let mut studio = Studio::open(Place::Demo, home.path());
     studio.send(ViewCommand::ShowPanes([Pane::Compare].into_iter().collect()).into());
-    let versus = Versus { a: a.parse().unwrap(), b: b.parse().unwrap(), mode: VersusMode::default() };
-    let shown = versus.clone();
-    studio.send(prefer(move |s| *s.versus_mut() = shown.clone()).into());
+    let compared = CompareChoice { a: a.parse().unwrap(), b: b.parse().unwrap(), mode: CompareMode::default() };
+    let shown = compared.clone();
+    studio.send(prefer(move |s| *s.compare_mut() = shown.clone()).into());
     studio.send(LibraryCommand::Select(PairId(40)).into());
     let state = &studio.state;
     let report = json(&["compare", "demo", "--pair", state.pair_name(), "--a", a, "--b", b], home.path());
@@ -234,16 +234,16 @@ fn two_predictions_are_compared_by_one_function() {
     assert_eq!(fingers.len(), 2);
     for (pad, finger) in state.rig().pads().zip(fingers) {
         for (key, [one, other]) in [
-            ("a", [&versus.a, &Subject::Measured]),
-            ("b", [&versus.b, &Subject::Measured]),
-            ("a_b", [&versus.a, &versus.b]),
+            ("a", [&compared.a, &Subject::Measured]),
+            ("b", [&compared.b, &Subject::Measured]),
+            ("a_b", [&compared.a, &compared.b]),
         ] {
             let found = results::subjects_compared(state, one, other, pad).ready().expect(key);
             assert_eq!(finger[key]["psnr_db"], optional(found.psnr_db), "{key}");
             assert_eq!(finger[key]["ssim"], optional(found.ssim), "{key}");
         }
     }
-    for (key, subject) in [("a_deg", &versus.a), ("b_deg", &versus.b)] {
+    for (key, subject) in [("a_deg", &compared.a), ("b_deg", &compared.b)] {
         let pose = results::subject_pose(state, subject).expect("a pose");
         assert_eq!(report["poses"][key], number(pose.angle_rad.to_degrees()), "{key}");
     }

@@ -16,7 +16,6 @@ use super::state::export::Output;
 use super::state::inspect::Inspected;
 use super::state::labels::Review;
 use super::state::library::Place;
-use super::state::settings::scene::{LayerLook, SceneLayer, SceneLook};
 use super::state::settings::{ColorRange, MaskTool};
 use super::state::tasks::TaskKind;
 use super::state::workbench::{Layer, SceneTool};
@@ -116,15 +115,6 @@ fn paint(paint: Paint) -> SettingsCommand {
     prefer(move |s| s.mask.paint = if s.mask.paint == paint { Paint::Contact } else { paint })
 }
 
-/// Shows the membrane's surface in place of its points, or the other way round.
-fn swap_membrane(look: &mut SceneLook) {
-    let (surface, points) = (look.layer(SceneLayer::Surface), look.layer(SceneLayer::Membrane));
-    let points = LayerLook { shown: surface.shown, ..points };
-    let surface = LayerLook { shown: !surface.shown, ..surface };
-    look.set(SceneLayer::Surface, surface);
-    look.set(SceneLayer::Membrane, points);
-}
-
 fn follow(state: &State) -> Option<Command> {
     let folder = state.library.open.as_ref().is_some_and(|open| open.source.root().is_some());
     when(folder, FollowCommand::Set(state.library.follow.is_none()))
@@ -221,9 +211,9 @@ fn escape(state: &State) -> Option<WorkbenchCommand> {
     }
 }
 
-/// A command of the time machine, where it is on screen and shows a step for which it can do something.
+/// A command to the steps of a registration, where they are on screen and shows a step for which it can do something.
 fn inspect(state: &State, useful: impl Fn(Inspected<'_>) -> bool, command: InspectCommand) -> Option<Command> {
-    let shown = state.selection.panes.contains(&Pane::TimeMachine).then(|| results::inspected(state))??;
+    let shown = state.selection.panes.contains(&Pane::Steps).then(|| results::inspected(state))??;
     when(useful(shown), command)
 }
 

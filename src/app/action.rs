@@ -229,14 +229,10 @@ macro_rules! actions {
             state => inspect(state, |s| s.at > 0, InspectCommand::Begin);
         LastStep, Pose, "Last step", "Where the registration ended", [shift(K::Period)],
             state => inspect(state, |s| !s.is_last(), InspectCommand::End);
-        PlaySteps, Pose, "Play the steps", "Plays the registration, or pauses; with the pointer in the time machine or a 3D view", [plain(K::Space)],
+        PlaySteps, Pose, "Play the steps", "Plays the registration, or pauses; with the pointer in the steps or a 3D view", [plain(K::Space)],
             state => inspect(state, |s| s.inspection.num_steps(s.run) > 1, InspectCommand::Play(!state.inspect.playing));
-        PinStep, Pose, "Compare this step", "Keeps this step on screen to compare others with it", [plain(K::J)],
-            state => inspect(state, |_| true, InspectCommand::Pin);
         OwnStarts, Pose, "All starts", "Back from a single start to all that the registration tries", [],
             state => when(state.inspect.start.is_some(), InspectCommand::Start(None));
-        Correspondences, Pose, "Show pull lines", "Lines from contact points to where they are pulled on the tool", [],
-            state => inspect(state, |_| true, InspectCommand::Lines(!state.inspect.lines));
         NextPoseEngine, Pose, "Next registration", "Cycles through the registration methods", [],
             _ => does(prefer(|s| s.registration = next_of(&s.registration.with_own_gate())));
 
@@ -272,22 +268,14 @@ macro_rules! actions {
             _ => does(prefer(|s| s.gel = next_of(&s.gel)));
         BothClouds, View, "Both clouds", "Shows measured and predicted points in each 3D view", [],
             state => does(WorkbenchCommand::SetBothClouds(!state.workbench.both_clouds));
-        CompareMode, View, "Next comparison", "Cycles through side by side, wipe, difference and 3D in Compare", [shift(K::F)],
-            _ => does(prefer(|s| s.versus_mut().mode = next_of(&s.versus_mut().mode)));
+        CompareMode, View, "Next comparison", "Cycles through side by side, wipe and difference in Compare", [shift(K::F)],
+            _ => does(prefer(|s| s.compare_mut().mode = next_of(&s.compare_mut().mode)));
         SwapCompared, View, "Swap A and B", "Swaps A and B in Compare", [shift(K::R)],
-            _ => does(prefer(|s| *s.versus_mut() = s.versus_mut().clone().swapped()));
+            _ => does(prefer(|s| *s.compare_mut() = s.compare_mut().clone().swapped()));
         WindowOnly, View, "GelSlim window only", "Draws in 3D only what the GelSlims see", [plain(K::W)],
             _ => does(prefer(|s| s.scene.only_window ^= true));
-        MembraneSurface, View, "Membrane as a surface", "Draws the membrane in 3D as a surface, or as points", [],
-            _ => does(prefer(|s| swap_membrane(&mut s.scene)));
-        EyeDome, View, "Depth shading", "Darkens what lies behind its neighbors (eye-dome lighting)", [],
-            _ => does(prefer(|s| s.scene.eye_dome ^= true));
         Parallel, View, "Parallel projection", "No perspective in 3D", [plain(K::I)],
             _ => does(prefer(|s| s.scene.orthographic ^= true));
-        CopyCamera, View, "Copy the camera", "Copies the viewpoint of the 3D view under the pointer; Ctrl+V over another applies it", [],
-            _ => ui(UiRequest::CopyCamera);
-        LinkCameras, View, "Link cameras", "Moves both 3D views together", [],
-            _ => does(prefer(|s| s.cameras_linked ^= true));
         Footprint, View, "GelSlim window", "Outlines what the GelSlim sees, on bubble images", [],
             _ => does(prefer(|s| s.footprint_visible ^= true));
         SwitchTheme, View, "Dark theme", "Switches between the dark and the light theme", [],
@@ -442,7 +430,6 @@ impl Action {
             Self::PoseTool => "hand gizmo drag manual move",
             Self::LockRange | Self::RangeOnce | Self::ResetRange => "colorbar colormap scale limits minimum maximum mm",
             Self::Fit => "zoom center home view",
-            Self::EyeDome => "edl shadow",
             Self::Parallel => "orthographic perspective camera",
             Self::Footprint => "rectangle outline crop",
             Self::SwitchTheme => "mode bright black white appearance",

@@ -32,9 +32,9 @@ macro_rules! rooms {
             Predict(PredictCommand) in predict,
             /// To masks, review states and accepted poses.
             Labels(LabelsCommand) in labels,
-            /// To the time machine.
+            /// To the steps of a registration.
             Inspect(InspectCommand) in inspect,
-            /// To layers, poses by hand and measurements.
+            /// To layers, poses by hand and points read.
             Workbench(WorkbenchCommand) in workbench,
             /// To the results table.
             Evaluate(EvaluateCommand) in evaluate,

@@ -18,7 +18,7 @@ pub(crate) const PREFETCH: usize = 4;
 pub fn demands(state: &State) -> Vec<Request> {
     let mut wants = Demands { state, list: Vec::new() };
     selection(&mut wants);
-    results::want_versus(&mut wants);
+    results::want_compared(&mut wants);
     results::want_thumbnails(&mut wants);
     results::want_doctor(&mut wants);
     neighbors(&mut wants);

@@ -36,7 +36,10 @@ pub enum DoctorCommand {
 
 pub(super) fn step(state: &mut State, command: DoctorCommand, effects: &mut Vec<Effect>) {
     match command {
-        DoctorCommand::Show(shown) => state.doctor.shown = shown && state.library.open.is_some(),
+        DoctorCommand::Show(shown) => {
+            state.close_dialogs();
+            state.doctor.shown = shown && state.library.open.is_some();
+        }
         DoctorCommand::Try => {
             let (Some(recipe), Some(open)) = (worth_recipe(state), &state.library.open) else { return };
             let source = open.source.clone();

@@ -45,9 +45,13 @@ pub enum ExportCommand {
 
 pub(super) fn step(state: &mut State, command: ExportCommand, effects: &mut Vec<Effect>) {
     match command {
-        ExportCommand::AskMasks(asking) => state.export.asking_masks = asking,
+        ExportCommand::AskMasks(asking) => {
+            state.close_dialogs();
+            state.export.asking_masks = asking;
+        }
         ExportCommand::SetMasks(choice) => state.export.masks = choice,
         ExportCommand::AskImport(from) => {
+            state.close_dialogs();
             state.export.imports += 1;
             let asked = state.export.imports;
             state.export.importing = from.map(|from| ImportForm { from, over_drawn: false, asked });

@@ -19,9 +19,9 @@ pub use touch2touch_pipeline::labels::{ImprintSource, Revision};
 pub use touch2touch_pipeline::steps::mask::MaskRecipe;
 
 pub use dataset::{AboutKey, ImportForm, ImportPlanKey, MaskPlanKey, ToolKey, TrainPlanKey};
-pub use imprint::{ImprintKey, MaskKey, MaskVersion, MeanKey, VersusKey};
+pub use imprint::{ComparisonKey, ImprintKey, MaskKey, MaskVersion, MeanKey};
 pub use inspection::Inspection;
-pub use pose::{CloudDifferenceKey, CloudKey, PoseBits, PoseKey, RunKey};
+pub use pose::{CloudKey, PoseBits, PoseKey, RunKey};
 pub(crate) use prediction::Keyed;
 pub use prediction::{PredictionKey, Preview};
 pub use proposal::{CadPlace, Distances, DistancesKey, ProposalInputs, ProposalKey};

@@ -363,7 +363,6 @@ fn show(state: &mut State, seq: DatasetSeq, place: Place, opened: Opened, effect
     state.selection.hover_point = None;
     state.workbench.leave_pair();
     inspect::rewind(state);
-    state.inspect.pins = [None, None];
     let (pairs, problems) = (opened.source.index().pairs.len(), opened.source.problems().len());
     let (level, hint) = match problems {
         0 => (Level::Info, None),

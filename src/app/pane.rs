@@ -46,7 +46,7 @@ pub enum Kind {
     /// Imprints of one side.
     Imprint(ImprintSource),
     /// Two imprints.
-    Versus,
+    Compare,
     /// 3D views of the sides that are chosen.
     Scene,
     /// Steps that can be played.
@@ -83,7 +83,7 @@ pub enum Demand {
     /// Implausible things about a prediction's way to meters.
     Flags,
     /// Any two imprints against each other.
-    Versus,
+    Compare,
     /// Cloud and pose in 3D, of the sides that are chosen.
     Scene,
     /// The poses of both sides.
@@ -132,12 +132,12 @@ macro_rules! panes {
                     at [Inspect Top(3), Align Top(2), Label Top(1), Evaluate Bottom(2), Adapt Bottom(2)]
                 }
             }
-            versus { Compare {
-                    "Compare", "Any two imprints of this touch: side by side, wipe, difference, 3D",
-                    Versus, needs [Versus], at [Inspect Bottom(1), Align Top(2), Evaluate Bottom(3), Adapt Bottom(3)]
+            compare { Compare {
+                    "Compare", "Any two imprints of this touch: side by side, wipe, difference",
+                    Compare, needs [Compare], at [Inspect Bottom(1), Align Top(2), Evaluate Bottom(3), Adapt Bottom(3)]
             } }
-            timemachine { TimeMachine {
-                "Time machine", "The registration step by step",
+            steps { Steps {
+                "Steps of the registration" as "Steps", "The registration step by step",
                 Steps, needs [Steps], at [Align Bottom(1)]
             } }
             masks {
@@ -198,7 +198,7 @@ macro_rules! define {
             /// The kind of what it shows.
             pub fn kind(self) -> Kind {
                 use ImprintSource::{Measured, Predicted};
-                use Kind::{Color, Form, Imprint, Scene, Steps, Versus};
+                use Kind::{Color, Compare, Form, Imprint, Scene, Steps};
                 match self { $($( Self::$pane => $kind, )*)* }
             }
 
@@ -206,8 +206,8 @@ macro_rules! define {
             pub fn needs(self) -> &'static [Demand] {
                 use ImprintSource::{Measured, Predicted};
                 use Demand::{
-                    Ambiguity, Comparison, Flags, Imprint, Masks, Pair, Poses, Scene,
-                    Steps, Thumbnails, Training, Versus,
+                    Ambiguity, Compare, Comparison, Flags, Imprint, Masks, Pair, Poses, Scene,
+                    Steps, Thumbnails, Training,
                 };
                 match self { $($( Self::$pane => &[$($need),*], )*)* }
             }

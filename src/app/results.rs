@@ -12,6 +12,7 @@ use super::state::results::{Cached, Computed, Key, Request, table};
 use touch2touch_pipeline::error::TaskError;
 
 pub(crate) mod cloud;
+pub(crate) mod compare;
 pub(crate) mod imprint;
 pub(crate) mod labels;
 pub(crate) mod manual;
@@ -28,10 +29,11 @@ pub(crate) mod sample;
 pub(crate) mod scores;
 pub(crate) mod shown;
 pub(crate) mod tool;
-pub(crate) mod versus;
 
 pub use cloud::cloud;
 pub(crate) use cloud::{automatic_cloud, cloud_key, latest, want_cloud};
+pub use compare::{comparison, subject, subject_key, subject_pose, subjects_compared};
+pub(crate) use compare::{want_compared, want_comparison};
 pub(crate) use imprint::want_imprint;
 pub use imprint::{flags, imprint, predicted_color};
 pub use manual::{accepted, accepted_elsewhere, by_hand, manual_begins, shown_pose};
@@ -66,8 +68,6 @@ pub use shown::{chosen, imprint_key, shown, worked_on};
 pub(crate) use shown::{imprint_of, pick, picked};
 pub use tool::{tool, tool_name};
 pub(crate) use tool::{tool_key, want_tool};
-pub use versus::{comparison, subject, subject_key, subject_pose, subjects_apart, subjects_compared};
-pub(crate) use versus::{pose_absent, subject_points, want_comparison, want_versus};
 
 /// A key that says how its result is computed.
 pub(crate) trait Computes: Key {

@@ -128,6 +128,11 @@ impl State {
         self.selection.panes.iter().any(|pane| pane.needs().contains(&need))
     }
 
+    /// Closes the dialogs that stand beside the work: there is one at a time.
+    pub(super) fn close_dialogs(&mut self) {
+        (self.export.asking_masks, self.export.importing, self.doctor.shown) = (false, None, false);
+    }
+
     /// True where a 3D view of a side is on screen.
     pub(super) fn shows_scene(&self, side: ImprintSource) -> bool {
         self.needs(Demand::Scene) && self.settings.scene_sides().sides().contains(&side)

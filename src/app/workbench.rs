@@ -144,7 +144,7 @@ fn start_icp(state: &mut State, effects: &mut Vec<Effect>) {
     if state.results.runs.contains(&key) {
         run_arrived(state, &key);
     }
-    // The time machine shows the same run, at its end: there the tool in hand goes.
+    // The pane of the steps shows the same run, at its end: there the tool in hand goes.
     inspect::step(state, InspectCommand::Source(source), effects);
     inspect::step(state, InspectCommand::Start(Some(start)), effects);
     inspect::step(state, InspectCommand::End, effects);

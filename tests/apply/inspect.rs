@@ -1,4 +1,4 @@
-//! The time machine: computed only while looked at, found again under their recipe.
+//! The steps of a registration: computed only while looked at, found again under their recipe.
 
 use touch2touch::app::action::Action;
 use touch2touch::app::command::{Command, LibraryCommand, Pane};
@@ -37,9 +37,9 @@ fn nothing_is_recorded_unless_it_is_looked_at() {
     assert!(pose.report.trace.is_empty() && pose.report.fits.is_empty());
     assert!(bench.state.results.inspections.is_empty());
     assert!(Action::StepBack.command(&bench.state).is_none(), "there is nothing to step through");
-    // The time machine alone records; it needs no pose beside.
+    // The pane of the steps alone records; it needs no pose beside.
     bench.state.results.poses.clear();
-    bench.send(panes(&[Pane::TimeMachine]));
+    bench.send(panes(&[Pane::Steps]));
     bench.settle();
     assert_eq!(bench.state.results.inspections.len(), 1);
     assert!(bench.state.results.poses.is_empty());
@@ -52,7 +52,7 @@ fn nothing_is_recorded_unless_it_is_looked_at() {
 
 #[test]
 fn stepping_goes_both_ways_and_stops_at_the_ends() {
-    let mut bench = bench(&[Pane::TimeMachine]);
+    let mut bench = bench(&[Pane::Steps]);
     let (run, last) = {
         let shown = results::inspected(&bench.state).unwrap();
         assert!(shown.is_last() && shown.run == shown.inspection.report().winner);
@@ -105,7 +105,7 @@ fn stepping_goes_both_ways_and_stops_at_the_ends() {
 
 #[test]
 fn a_start_is_a_run_of_its_own_and_the_pair_resets_it() {
-    let mut bench = bench(&[Pane::TimeMachine]);
+    let mut bench = bench(&[Pane::Steps]);
     let start = PlanarPose { theta_rad: 0.3, y_m: 0.004, z_m: 0.0 };
     send(&mut bench, InspectCommand::Start(Some(PlanarPose { y_m: f64::NAN, ..start })));
     assert_eq!(bench.state.inspect.start, None);

@@ -1,4 +1,4 @@
-//! Looking into a registration: what a step of the time machine compares.
+//! Looking into a registration: what a step compares.
 
 use glam::{DVec2, DVec3};
 

@@ -50,7 +50,7 @@ pub fn equivalent_words(state: &State, pane: Pane) -> Option<Vec<String>> {
     let words = match (pane, pane.kind()) {
         (Pane::Browser | Pane::Log, _) => verb("doctor"),
         (_, Kind::Scene) => posed(of_pair("export")?.option("--out", "exported"), state.workbench.side),
-        (Pane::TimeMachine, _) => {
+        (Pane::Steps, _) => {
             let start = state.inspect.start.map(|start| start_text(start.get()));
             posed(of_pair("pose")?, side).option_if("--start", start).word("--trace").word("--json")
         }
@@ -62,10 +62,10 @@ pub fn equivalent_words(state: &State, pane: Pane) -> Option<Vec<String>> {
             of_pair("generate")?.option("--finger", "both").option("--out", "predictions").then(drawn())
         }
         (Pane::Compare, _) => {
-            let versus = state.settings.compared();
+            let chosen = state.settings.compared();
             of_pair("compare")?
-                .option("--a", placed(state, &versus.a))
-                .option("--b", placed(state, &versus.b))
+                .option("--a", placed(state, &chosen.a))
+                .option("--b", placed(state, &chosen.b))
                 .then(recipe_shown(state, ImprintSource::Predicted).words(Stage::Pose))
         }
         (Pane::Masks, _) => of_pair("label")?,

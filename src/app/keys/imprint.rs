@@ -75,14 +75,14 @@ pub enum MaskVersion {
 
 /// One imprint against another of the same touch.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct VersusKey {
+pub struct ComparisonKey {
     /// One: the error map is its imprint minus the other's.
     pub a: ImprintKey,
     /// The other.
     pub b: ImprintKey,
 }
 
-impl VersusKey {
+impl ComparisonKey {
     /// A prediction against the measurement of its touch.
     pub fn measured(recipe: PredictionKey, shift: ShiftMode) -> Self {
         Self { b: ImprintKey::Measured(recipe.touch), a: ImprintKey::Predicted(recipe, shift) }

@@ -73,12 +73,3 @@ impl LayersKey {
         RunKey { pose: self.0.clone(), start: None }
     }
 }
-
-/// The distances of the points of one cloud from another.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct CloudDifferenceKey {
-    /// The cloud whose points are measured.
-    pub a: CloudKey,
-    /// The other.
-    pub b: CloudKey,
-}

@@ -414,7 +414,7 @@ fn leave_out(value: &mut Value, path: &str, fits: &dyn Fn(Value) -> bool) -> Vec
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::app::settings::{Versus, Workspace};
+    use crate::app::settings::{CompareChoice, Workspace};
     use touch2touch_core::frames::PlanarPose;
     use touch2touch_core::grid::Mask;
     use touch2touch_core::label::Provenance;
@@ -554,13 +554,13 @@ mod tests {
         // Keys that cannot be used cost nothing else, and are said.
         // A field that cannot be read falls back alone, and the file as it was is kept.
         let one = r#"{"version": 1, "theme": "plaid", "ui_zoom": 2.0, "recent": ["demo", 7, {"path": "/data/x"}],
-            "versus": {"inspect": {"a": "measured", "b": "prediction:bundle=a, b"}, "label": {"a": "stored"}},
+            "compare": {"inspect": {"a": "measured", "b": "prediction:bundle=a, b"}, "label": {"a": "stored"}},
             "mask": {"radius_px": "wide", "clean_mm": 2.0}, "last": {"cameras": ["one"], "pair": "data_6"}}"#;
         std::fs::write(&file, one).unwrap();
         let (settings, problem) = services.load_settings();
         let problem = problem.unwrap();
         assert!(problem.hint.unwrap().contains(BAD_SETTINGS_FILE));
-        let fields = ["last.cameras", "mask.radius_px", "recent[1]", "theme", "versus.inspect.b"];
+        let fields = ["compare.inspect.b", "last.cameras", "mask.radius_px", "recent[1]", "theme"];
         let fields = fields.map(|field| format!("{field} cannot be read")).join("; ");
         assert_eq!(problem.why, format!("{fields} ({})", file.display()));
         assert_eq!(std::fs::read_to_string(file.with_file_name(BAD_SETTINGS_FILE)).unwrap(), one);
@@ -568,9 +568,9 @@ mod tests {
         want.recent = vec![Place::Demo, Place::Path("/data/x".into())];
         want.mask.clean_mm = 2.0;
         want.last.pair = "data_6".into();
-        let versus = |a| Versus { a, ..Versus::default() };
-        want.versus.insert(Workspace::Inspect, versus(Subject::Measured));
-        want.versus.insert(Workspace::Label, versus(Subject::Stored));
+        let compared = |a| CompareChoice { a, ..CompareChoice::default() };
+        want.compare.insert(Workspace::Inspect, compared(Subject::Measured));
+        want.compare.insert(Workspace::Label, compared(Subject::Stored));
         assert_eq!(settings, want);
     }
 

@@ -19,7 +19,7 @@ use touch2touch_core::grid::{DepthMap, RgbGrid};
 use touch2touch_core::postprocess::Flag;
 use touch2touch_core::sample::Sample;
 use touch2touch_core::which_tool::Candidate;
-use touch2touch_pipeline::compare::deviation::{CloudDifference, Deviation};
+use touch2touch_pipeline::compare::deviation::Deviation;
 use touch2touch_pipeline::compare::{Beside, Comparison};
 use touch2touch_pipeline::doctor::Fact;
 use touch2touch_pipeline::export::Plan;
@@ -63,9 +63,7 @@ macro_rules! table {
         /// A prediction that is compared with something: kept with the others.
         Compared(ComparedKey => Prediction);
         /// Any two imprints of a touch against each other.
-        Versus(VersusKey => Comparison, |found| found.error.len() * 4) in versus, 64 * MIB;
-        /// The distances of the points of one cloud from another.
-        Apart(CloudDifferenceKey => CloudDifference, CloudDifference::bytes) in apart, 16 * MIB;
+        Comparison(ComparisonKey => Comparison, |found| found.error.len() * 4) in comparisons, 64 * MIB;
         /// Flags: implausible things about the way of a prediction to meters.
         Flags(FlagsKey => Vec<Flag>, |found| found.len() * 512) in flags, MIB;
         /// The ambiguity of a GelSlim image: what it leaves open.

@@ -82,8 +82,6 @@ pub enum UiRequest {
     Close,
     /// Turn the 3D cameras.
     Camera(CameraPreset),
-    /// Write the camera of the 3D view under the pointer to the clipboard.
-    CopyCamera,
     /// Fit images and 3D views to their panes.
     Fit,
     /// Bring a pane of the workspace to the front.

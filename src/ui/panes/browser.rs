@@ -148,7 +148,7 @@ fn score_row(cx: &mut Cx<'_>, ui: &mut Ui) {
                 }
             }
         });
-        let tip = "Score to show, sort and filter by";
+        let tip = format!("Score to show, sort and filter by, of {}; Results chooses another source", by.short());
         response.response.accessible_name("Score").on_hover_text(tip);
         let text = if chosen.best_first { "Best first" } else { "Worst first" };
         let button = egui::Button::new(RichText::new(text).size(SMALL)).selected(sorted);
@@ -158,18 +158,6 @@ fn score_row(cx: &mut Cx<'_>, ui: &mut Ui) {
             next = Some(ScoreChoice { best_first: sorted && !chosen.best_first, ..chosen.clone() });
         }
     });
-    if table.scores.sources.len() > 1 {
-        let combo = egui::ComboBox::from_id_salt("source").width(ui.available_width());
-        let response = combo.selected_text(by.short()).truncate().show_ui(ui, |ui| {
-            for source in &table.scores.sources {
-                if ui.selectable_label(source.name == by.name, &*source.name).clicked() {
-                    next = Some(ScoreChoice { source: Some(source.name.clone()), ..chosen.clone() });
-                }
-            }
-        });
-        let tip = "Score of the measured imprints (the upper bound) or of a generator";
-        response.response.accessible_name("Source of the score").on_hover_text(tip);
-    }
     if let Some(next) = next {
         cx.push(LibraryCommand::SetScore(next));
     }

@@ -52,8 +52,7 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
             source::show(cx, ui);
             fold(ui, "Clean up", "One-click clean-ups of the mask", |ui| clean_ups(cx, ui));
             note(cx, ui, memory);
-            fold(ui, "More", "Overlays, drawing in 3D, which mask is edited", |ui| {
-                overlay(cx, ui);
+            fold(ui, "More", "Opacity, drawing in 3D, which mask is edited", |ui| {
                 opacity(cx, ui);
                 in_3d(cx, ui);
                 correct(cx, ui);
@@ -376,23 +375,6 @@ fn note(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
     }
     let tip = "A note about this pair. The list marks pairs with notes, and its filter searches them";
     response.on_hover_text(tip);
-}
-
-/// Switches of the layers over the imprints.
-fn overlay(cx: &mut Cx<'_>, ui: &mut Ui) {
-    let settings = &cx.state.settings;
-    let switches = [
-        (Action::MaskVisible, "mask", settings.mask_visible),
-        (Action::MaskOutline, "outline", settings.mask_outline),
-        (Action::Footprint, "GelSlim window", settings.footprint_visible),
-    ];
-    ui.horizontal_wrapped(|ui| {
-        ui.spacing_mut().item_spacing = vec2(4.0, 4.0);
-        ui.label(caption("Show", cx.p));
-        for (action, text, on) in switches {
-            cx.action_switch(ui, action, text, on);
-        }
-    });
 }
 
 fn opacity(cx: &mut Cx<'_>, ui: &mut Ui) {

@@ -1,7 +1,7 @@
 //! One table of scores: a row for each method over all pairs, then a row for each pair by the method that is chosen.
 
 use eframe::egui::{
-    self, Align2, Color32, FontId, Rect, RichText, Role, ScrollArea, Sense, Shape, Stroke, Ui, WidgetInfo, pos2, vec2,
+    Align2, Color32, FontId, Rect, RichText, Role, ScrollArea, Sense, Shape, Stroke, Ui, WidgetInfo, pos2, vec2,
 };
 
 use super::browser::score_color;

@@ -6,7 +6,6 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::time::Instant;
 
 use eframe::egui::{self, ThemePreference, ViewportCommand};
 use egui_tiles::Tree;
@@ -35,7 +34,7 @@ use crate::app::workbench::WorkbenchCommand;
 use crate::ui::panes::log as log_pane;
 use crate::ui::parts::cx::{Cx, Shared};
 use crate::ui::parts::dialogs::Purpose;
-use crate::ui::parts::kept::KeptFrame;
+use crate::ui::parts::frame_cache::FrameCache;
 use crate::ui::parts::letters;
 use crate::ui::parts::scene_view::Device;
 use crate::ui::parts::theme;
@@ -62,7 +61,7 @@ pub struct Options {
     pub screenshots: Option<PathBuf>,
     /// Loss of the graphics device: whoever opened the window asks it when the window is closed.
     pub loss: Loss,
-    /// True where every frame is painted whole even where a program draws (for measuring what [`crate::ui::parts::kept`] saves).
+    /// True where every frame is painted whole even where a program draws (for measuring what [`crate::ui::parts::frame_cache`] saves).
     pub whole_frames: bool,
 }
 
@@ -91,8 +90,6 @@ pub struct StudioApp {
     panes: Panes,
     palette: palette::Memory,
     shortcuts: shortcuts::Memory,
-    /// Time of the last frame, milliseconds.
-    frame_ms: f32,
     trees: BTreeMap<Workspace, Tree<Pane>>,
     device: Result<Device, String>,
     inline: bool,
@@ -134,7 +131,7 @@ impl StudioApp {
             log::error!("No 3D views: {why}");
         }
         if let Some(state) = cc.wgpu_render_state.as_ref().filter(|_| !options.whole_frames)
-            && let Err(error) = KeptFrame::install(&cc.egui_ctx, state)
+            && let Err(error) = FrameCache::install(&cc.egui_ctx, state)
         {
             log::error!("Every frame is painted whole: {error}");
         }
@@ -161,7 +158,6 @@ impl StudioApp {
             panes: Panes::default(),
             palette: palette::Memory::default(),
             shortcuts: shortcuts::Memory::default(),
-            frame_ms: 0.0,
             trees: BTreeMap::new(),
             device,
             inline: options.inline,
@@ -203,7 +199,7 @@ impl StudioApp {
 
     /// Pixels of the window painted so far, where only what changed is painted. For tests.
     pub fn painted(&self, ctx: &egui::Context) -> Option<u64> {
-        ctx.with_plugin(|kept: &mut KeptFrame| kept.painted())
+        ctx.with_plugin(|cache: &mut FrameCache| cache.painted())
     }
 
     /// True where nothing runs, nothing waits and nothing is to be executed.
@@ -349,23 +345,13 @@ impl StudioApp {
                 self.leaving = true;
                 ctx.send_viewport_cmd(ViewportCommand::Close);
             }
-            UiRequest::Camera(preset) => {
-                // The view under the pointer turns; linked cameras turn together.
-                let over = self.panes.hovered.filter(|pane| pane.kind() == Kind::Scene);
-                let side = over.and(self.panes.memories.scene.hovered);
-                let only = side.filter(|_| !self.state.settings.cameras_linked);
-                self.panes.memories.scene.look_from(only, preset);
-            }
-            UiRequest::CopyCamera => {
-                let over = self.panes.memories.scene.hovered;
-                ctx.copy_text(self.panes.memories.scene.camera_text(over.unwrap_or_default()));
-            }
+            UiRequest::Camera(preset) => self.panes.memories.scene.look_from(preset),
             UiRequest::Fit => {
                 let memories = &mut self.panes.memories;
                 match self.panes.hovered.map(Pane::kind) {
                     Some(Kind::Scene) => memories.scene.fit(),
                     Some(Kind::Color) => self.shared.views.fit(Some(SensorKind::Color)),
-                    Some(Kind::Imprint(_) | Kind::Versus) => self.shared.views.fit(Some(SensorKind::Depth)),
+                    Some(Kind::Imprint(_) | Kind::Compare) => self.shared.views.fit(Some(SensorKind::Depth)),
                     _ => {
                         self.shared.views.fit(None);
                         memories.scene.fit();
@@ -494,7 +480,6 @@ impl eframe::App for StudioApp {
     }
 
     fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
-        let started = Instant::now();
         let ctx = ui.ctx().clone();
         self.outside(&ctx);
         self.shared.textures.begin_frame();
@@ -544,8 +529,7 @@ impl eframe::App for StudioApp {
             }
             edited = bars::top(&mut cx, ui, &mut tree);
             // Drawn before the panes, so it shows the read-out of the frame before: at rest they are the same.
-            bars::bottom(&mut cx, ui, self.frame_ms);
-            log_pane::notices(&mut cx, ui);
+            bars::bottom(&mut cx, ui);
             readout = cx.shared.readout.take();
             let frame = egui::Frame::new().fill(cx.p.frame);
             egui::CentralPanel::default().frame(frame).show(ui, |ui| match self.panes.maximized {
@@ -558,12 +542,13 @@ impl eframe::App for StudioApp {
                     layout::restore_collapsed(&mut tree, hidden);
                 }
             });
+            log_pane::notices(&mut cx, &ctx);
             bars::hint(&mut cx, &ctx);
             doctor::panel(&mut cx, &ctx);
             export::masks::form(&mut cx, &ctx);
             export::import::form(&mut cx, &ctx);
             palette::show(&mut cx, &ctx, &mut self.palette);
-            shortcuts::sheet(&mut cx, &ctx, &mut self.shortcuts);
+            shortcuts::list(&mut cx, &ctx, &mut self.shortcuts);
             unsaved::question(&mut cx, &ctx);
             bars::drop_overlay(&cx, &ctx);
             if let Some((purpose, path)) = cx.shared.dialogs.show(&ctx) {
@@ -585,7 +570,6 @@ impl eframe::App for StudioApp {
         if !self.inbox.is_empty() {
             ctx.request_repaint();
         }
-        self.frame_ms = started.elapsed().as_secs_f32() * 1e3;
     }
 
     fn on_exit(&mut self) {

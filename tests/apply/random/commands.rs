@@ -28,8 +28,8 @@ use touch2touch::app::predict::{Generate, Refit};
 use touch2touch::app::services::{Followed, Services as _};
 use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{
-    Change, ColorMap, ColorRange, GelView, GenerateSettings, Last, LayerLook, LayerSize, MaskChoice, MaskSettings,
-    MaskSource, MaskTool, SceneLayer, SceneLook, Settings, SpacePane, Theme, Versus, VersusMode, Workspace,
+    Change, ColorMap, ColorRange, CompareChoice, CompareMode, GelView, GenerateSettings, Last, MaskChoice,
+    MaskSettings, MaskSource, MaskTool, SceneLayer, SceneLook, Settings, SpacePane, Theme, Workspace,
 };
 use touch2touch::app::state::results::{Computed, Request};
 use touch2touch::app::tasks::{TaskKind, Ticket, Write};
@@ -119,10 +119,9 @@ fn cure() -> impl Strategy<Value = Cure> {
 }
 
 fn scene() -> impl Strategy<Value = SceneLook> {
-    (any_of::<SceneLayer>(), [number(), number(), number()], any::<bool>()).prop_map(|(layer, [a, b, c], on)| {
-        let look = LayerLook { shown: on, color: None, opacity: a, size: LayerSize::Mm(b) };
-        let mut scene = SceneLook { distance_m: c, eye_dome: on, ..SceneLook::default() };
-        scene.set(layer, look);
+    (any_of::<SceneLayer>(), number()).prop_map(|(layer, distance_m)| {
+        let mut scene = SceneLook { distance_m, ..SceneLook::default() };
+        scene.toggle(layer);
         scene
     })
 }
@@ -140,8 +139,8 @@ fn subject() -> impl Strategy<Value = Subject> {
     select(texts.map(|text| text.parse().expect("a subject")).to_vec())
 }
 
-fn versus() -> impl Strategy<Value = Versus> {
-    (subject(), subject(), any_of::<VersusMode>()).prop_map(|(a, b, mode)| Versus { a, b, mode })
+fn compare_choice() -> impl Strategy<Value = CompareChoice> {
+    (subject(), subject(), any_of::<CompareMode>()).prop_map(|(a, b, mode)| CompareChoice { a, b, mode })
 }
 
 fn planar() -> impl Strategy<Value = PlanarPose> {
@@ -219,10 +218,10 @@ pub(super) fn change() -> impl Strategy<Value = Change> {
         3 => any_of::<Paint>().prop_map(|v| prefer(move |s| s.mask.paint = v)),
         2 => any_of::<MaskSource>().prop_map(|v| prefer(move |s| s.mask.choice.source = v)),
         1 => number().prop_map(|v| prefer(move |s| s.mask.radius_px = v)),
-        1 => any::<[bool; 5]>().prop_map(|[visible, outline, footprint, linked, hint]| {
+        1 => any::<[bool; 4]>().prop_map(|[visible, outline, footprint, hint]| {
             prefer(move |s| {
                 (s.mask_visible, s.mask_outline, s.footprint_visible) = (visible, outline, footprint);
-                (s.cameras_linked, s.hint_dismissed) = (linked, hint);
+                s.hint_dismissed = hint;
             })
         }),
         1 => number().prop_map(|v| prefer(move |s| s.mask_opacity = v)),
@@ -233,7 +232,7 @@ pub(super) fn change() -> impl Strategy<Value = Change> {
         1 => scene().prop_map(|v| prefer(move |s| s.scene = v.clone())),
         1 => any_of::<SpacePane>().prop_map(|sides| prefer(move |s| _ = s.sides.insert(s.workspace, sides))),
         1 => any_of::<GelView>().prop_map(|gel| prefer(move |s| s.gel = gel)),
-        1 => versus().prop_map(|v| prefer(move |s| *s.versus_mut() = v.clone())),
+        1 => compare_choice().prop_map(|v| prefer(move |s| *s.compare_mut() = v.clone())),
         1 => any_of::<Workspace>().prop_map(|v| prefer(move |s| s.workspace = v)),
     ]
     .prop_map(|command| match command {
@@ -450,9 +449,6 @@ draws! {
         1 Begin,
         1 End,
         1 Play(any::<bool>()),
-        1 Pin,
-        1 Unpin(0usize..4),
-        1 Lines(any::<bool>()),
     }
     workbench: WorkbenchCommand {
         1 SetLayer(any_of::<Layer>()),

@@ -24,8 +24,8 @@ const CAPTION: f32 = 16.0;
 pub(super) fn worth(cx: &mut Cx<'_>, ui: &mut Ui) {
     let Some(adapted) = cx.state.learn.adapted.clone() else { return };
     refusal(cx, ui, &adapted);
-    scores(cx, ui, &adapted);
     before_and_after(cx, ui);
+    scores(cx, ui, &adapted);
     pads(cx, ui, &adapted);
     remarks(cx, ui, &adapted);
 }
@@ -75,7 +75,6 @@ fn refusal(cx: &mut Cx<'_>, ui: &mut Ui, adapted: &Adapted) {
 fn before_and_after(cx: &mut Cx<'_>, ui: &mut Ui) {
     let state = cx.state;
     let Some(held) = learn::held_back(state) else { return };
-    ui.add_space(8.0);
     ui.label(section("A touch left out of the fit", cx.p));
     // A fit that was made again has other pictures.
     let fit = state.learn.adapted.as_ref().map(|adapted| adapted.seconds.to_bits());

@@ -1,18 +1,16 @@
-//! Additions of the time machine to a 3D view: the CAD model at the step shown, correspondences, pinned steps.
+//! Additions of a registration's steps to a 3D view: the CAD model at the step shown, lines to the counterparts.
 
 use std::sync::Arc;
 
-use eframe::egui::{Align2, Color32, FontId, Rect, Ui, pos2, vec2};
+use eframe::egui::{Align2, Color32, FontId, Rect, Sense, Ui, pos2};
 use glam::{DAffine3, DVec3};
 
 use super::Memory;
 use crate::app::inspect::Inspected;
 use crate::app::keys::{ImprintSource, Inspection};
 use crate::app::results;
-use crate::app::settings::SceneLayer;
 use crate::app::workbench::Layer;
 use crate::gpu::lines::{LinesItem, LinesStyle, Segment};
-use crate::gpu::mesh::{MeshItem, Shading};
 use crate::gpu::scene::SceneData;
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{DARK, Palette};
@@ -44,13 +42,16 @@ pub(super) struct StepLines {
     residual_m: Option<[f64; 2]>,
 }
 
-/// The pose at which the step shown has the CAD model, if the time machine looks at this side.
+/// The pose at which the step shown has the CAD model, if the pane of the steps looks at this side.
 pub(super) fn pose(cx: &Cx<'_>, source: ImprintSource) -> Option<PlanarPose> {
     results::inspected_in(cx.state, source).map(|shown| shown.step.grasp_from_object)
 }
 
 /// Makes the lines of the step shown, once per step.
 pub(super) fn update(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource) {
+    if cx.state.workbench.layer != Layer::Correspondences {
+        return;
+    }
     let Some(Inspected { inspection, run, at, step }) = results::inspected_in(cx.state, source) else { return };
     let Some(tool) = results::tool(cx.state).ready() else { return };
     let dark = *cx.p == DARK;
@@ -81,12 +82,12 @@ pub(super) fn update(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource) {
 
 /// The lines of a side, if they are to be drawn.
 fn lines<'a>(cx: &Cx<'_>, memory: &'a Memory, source: ImprintSource) -> Option<&'a StepLines> {
-    let on = cx.state.inspect.lines || cx.state.workbench.layer == Layer::Correspondences;
+    let on = cx.state.workbench.layer == Layer::Correspondences;
     let shown = results::inspected_in(cx.state, source).filter(|_| on)?;
     memory.step_lines.as_ref().filter(|l| Arc::ptr_eq(&l.of, shown.inspection))
 }
 
-/// Adds correspondences and pinned steps.
+/// Adds the lines of the step shown.
 pub(super) fn add(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, scene: &mut SceneData) {
     if let Some(lines) = lines(cx, memory, source) {
         scene.lines.push(LinesItem {
@@ -96,29 +97,6 @@ pub(super) fn add(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, scene: &m
             style: LinesStyle { world_from_lines: DAffine3::IDENTITY, width_px: 1.5, opacity: 1.0, overlay: true },
         });
     }
-    let Some(mesh) = &memory.mesh else { return };
-    let look = cx.state.settings.scene.layer(SceneLayer::Pins);
-    for (i, pin) in pins(cx, source).filter(|_| look.shown) {
-        scene.meshes.push(MeshItem {
-            name: format!("CAD at pin {i}"),
-            revision: mesh.revision,
-            mesh: mesh.mesh.clone(),
-            shading: Shading::Smooth,
-            values: Arc::default(),
-            style: super::layers::outline(pin.to_affine(), cx.p.pins[i], look),
-        });
-    }
-}
-
-/// Number and pose of the pins of a side.
-fn pins(cx: &Cx<'_>, source: ImprintSource) -> impl Iterator<Item = (usize, PlanarPose)> {
-    let pins = cx.state.inspect.pins_of(cx.state.pair_key()).into_iter().enumerate();
-    pins.filter_map(move |(i, pin)| pin.filter(|p| p.source == source).map(|p| (i, p.grasp_from_object)))
-}
-
-/// Colors and names of the pins of a side, for the legend.
-pub(super) fn legend_entries(cx: &Cx<'_>, source: ImprintSource) -> Vec<(Color32, &'static str)> {
-    pins(cx, source).map(|(i, _)| (cx.p.pins[i], ["CAD, step A", "CAD, step B"][i])).collect()
 }
 
 /// The color of a residual. The end of the map that would vanish before the background is left out.
@@ -132,30 +110,20 @@ fn color_at(p: &Palette, share: f32) -> Color32 {
     Color32::from_rgb(r, g, b)
 }
 
-/// Legend of the lines' colors, with their numbers.
-pub(super) fn show_legend(cx: &Cx<'_>, ui: &Ui, memory: &Memory, source: ImprintSource, rect: Rect) {
+/// Bar of the lines' colors, with their numbers; what is in it is said behind `bar`.
+pub(super) fn bar(cx: &Cx<'_>, ui: &Ui, memory: &Memory, source: ImprintSource, bar: Rect) {
     let Some(lines) = lines(cx, memory, source) else { return };
-    let painter = ui.painter_at(rect);
-    let font = FontId::proportional(11.0);
-    let (width, left) = (110.0, rect.left() + 176.0);
-    let beside = if cx.state.workbench.layer != Layer::None { 440.0 } else { 310.0 };
-    if rect.width() < width + beside {
-        return;
-    }
-    let bar = Rect::from_min_size(pos2(left, rect.bottom() - 38.0), vec2(width, 6.0));
-    gradient(&painter, bar, 16, |share| color_at(cx.p, share));
-    let y = bar.bottom() + 2.0;
-    painter.text(pos2(bar.left(), y), Align2::LEFT_TOP, "0", font.clone(), cx.p.weak);
-    let end = format!("{RESIDUAL_MM:.0} mm residual");
-    painter.text(pos2(bar.right(), y), Align2::RIGHT_TOP, end, font.clone(), cx.p.weak);
+    let painter = ui.painter();
+    gradient(painter, bar, 32, |share| color_at(cx.p, share));
+    let font = FontId::proportional(10.0);
+    let text = pos2(bar.right(), bar.top() - 3.0);
+    painter.text(text, Align2::RIGHT_BOTTOM, "residual of the pull lines", font.clone(), cx.p.text);
+    painter.text(bar.left_bottom(), Align2::LEFT_TOP, "0", font.clone(), cx.p.text);
+    painter.text(bar.right_bottom(), Align2::RIGHT_TOP, format!("{RESIDUAL_MM:.0} mm"), font, cx.p.text);
     let [shown, of] = lines.shown;
-    let points =
-        if shown == of { format!("{of} points") } else { format!("1 of {} points", of.div_ceil(shown.max(1))) };
-    let text = match lines.residual_m {
-        Some([median, max]) => {
-            format!("{points}: residual {} (median), {} (largest)", units::text_mm(median), units::text_mm(max))
-        }
-        None => points,
-    };
-    painter.text(pos2(bar.left(), bar.top() - 3.0), Align2::LEFT_BOTTOM, text, font, cx.p.weak);
+    let mut about = format!("{shown} of {of} points have a line");
+    if let Some([median, max]) = lines.residual_m {
+        about += &format!("; residual {} (median), {} (largest)", units::text_mm(median), units::text_mm(max));
+    }
+    ui.interact(bar.expand(8.0), ui.scope_id().with("pull lines"), Sense::hover()).on_hover_text(about);
 }

@@ -5,7 +5,6 @@ use strum::IntoEnumIterator as _;
 
 use crate::app::action::Action;
 use crate::app::command::{Command, Pane};
-use crate::app::settings::SceneLayer;
 use crate::app::workbench::{Layer, SceneTool, WorkbenchCommand};
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::caption;
@@ -82,8 +81,6 @@ fn views(cx: &mut Cx<'_>, ui: &mut Ui) {
         ui.separator();
         let settings = &cx.state.settings;
         cx.menu_row(ui, Action::Parallel, settings.scene.orthographic);
-        cx.menu_row(ui, Action::LinkCameras, settings.cameras_linked);
-        cx.menu_row(ui, Action::CopyCamera, false);
     });
 }
 
@@ -109,16 +106,7 @@ fn shown(cx: &mut Cx<'_>, ui: &mut Ui) {
             }
         }
         ui.separator();
-        let scene = &cx.state.settings.scene;
-        let (window, surface, edl) = (scene.only_window, scene.layer(SceneLayer::Surface).shown, scene.eye_dome);
-        let both = cx.state.workbench.both_clouds;
-        for (action, on) in [
-            (Action::WindowOnly, window),
-            (Action::BothClouds, both),
-            (Action::MembraneSurface, surface),
-            (Action::EyeDome, edl),
-        ] {
-            cx.menu_row(ui, action, on);
-        }
+        cx.menu_row(ui, Action::WindowOnly, cx.state.settings.scene.only_window);
+        cx.menu_row(ui, Action::BothClouds, cx.state.workbench.both_clouds);
     });
 }

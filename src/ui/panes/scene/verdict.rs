@@ -35,8 +35,8 @@ fn lacks_contact(state: &State, source: ImprintSource) -> bool {
     }
 }
 
-/// The line; takes its height from the top of the pane.
-pub(super) fn line(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
+/// The line; takes its height from the top of the pane. What mends both sides is offered on the `first`.
+pub(super) fn line(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, first: bool) {
     let (text, color, mut details) = said(cx, source);
     let width = ui.available_width();
     let (rect, response) = ui.allocate_exact_size(vec2(width, HEIGHT), Sense::hover());
@@ -62,7 +62,7 @@ pub(super) fn line(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
     }
     // The CAD model is in another unit: it is said in which, and that is all.
     let units = match results::pose(cx.state, source) {
-        Lookup::Failed(err) => err.units.clone(),
+        Lookup::Failed(err) if first => err.units.clone(),
         _ => None,
     };
     if let Some(offer) = units {
@@ -118,10 +118,7 @@ fn said(cx: &Cx<'_>, source: ImprintSource) -> (String, Color32, Vec<String>) {
         Lookup::Ready(pose) | Lookup::Stale(pose) => {
             let angle = pose.angle_text();
             let (mut text, color) = match &pose.verdict {
-                Some(verdict) => {
-                    let why = if verdict.grade > Grade::Good { format!(": {}", verdict.why) } else { String::new() };
-                    (format!("{angle} · {}{why}", verdict.grade), grade_color(cx.p, verdict.grade))
-                }
+                Some(verdict) => (format!("{} · {angle}", verdict.grade), grade_color(cx.p, verdict.grade)),
                 None => (angle, cx.p.strong),
             };
             if results::provisional_pose(state, source).is_some() {
@@ -137,6 +134,9 @@ fn said(cx: &Cx<'_>, source: ImprintSource) -> (String, Color32, Vec<String>) {
                 let off = PoseDifference::between(pose.grasp_from_object, truth);
                 text += &format!(" · {}", difference("off by", "", off));
                 details.extend(pose.truth_rad.map(|truth| format!("true angle {}", units::text_deg(truth))));
+            }
+            if let Some(verdict) = pose.verdict.as_ref().filter(|verdict| verdict.grade > Grade::Good) {
+                text += &format!(" · {}", verdict.why);
             }
             if results::sample(state).ready().is_some_and(|sample| sample.scale == Scale::Assumed) {
                 text += " · assumed camera";
@@ -155,8 +155,8 @@ fn said(cx: &Cx<'_>, source: ImprintSource) -> (String, Color32, Vec<String>) {
             details.push(difference("Pose by hand: error", "", off));
         }
     }
-    if let Some(apart) = results::sides_apart(state) {
-        details.push(difference("Measured vs predicted:", "apart", apart));
+    if let Some(between) = results::sides_apart(state) {
+        details.push(difference("Measured vs predicted:", "apart", between));
     }
     (text, color, details)
 }

@@ -30,8 +30,6 @@ pub(crate) struct Colorbar<'a> {
     pub histogram: Option<&'a Histogram>,
     /// True where the range stays when another sample is shown; `None` shows no lock.
     pub locked: Option<bool>,
-    /// Beside the unit, e.g. `assumed scale`.
-    pub note: &'a str,
     /// Tooltips of the button that sets the range from what is shown, and of the lock.
     pub tips: [String; 2],
 }
@@ -58,24 +56,17 @@ impl Colorbar<'_> {
                 let wide = ui.available_width() >= WIDE;
                 let mut edited = range;
                 let lo = end(ui, &mut edited.lo, &format!("{}, lower end", self.label));
-                // In a narrow pane the note stands on the picture alone: the colors need the room.
-                let noted = wide && !self.note.is_empty();
-                let note = if noted { 80.0 } else { 0.0 };
                 let buttons = match (wide, self.locked.is_some()) {
                     (true, true) => 76.0,
                     (true, false) => 40.0,
                     (false, _) => 22.0,
                 };
-                let width = (ui.available_width() - END - 26.0 - buttons - note - 8.0).max(24.0);
+                let width = (ui.available_width() - END - 26.0 - buttons - 8.0).max(24.0);
                 if let Some(new) = self.gradient(ui, width, range, p) {
                     asked = Some(ColorbarChange::Range(new));
                 }
                 let hi = end(ui, &mut edited.hi, &format!("{}, upper end", self.label));
                 ui.label(egui::RichText::new("mm").size(SMALL).color(p.weak));
-                if noted {
-                    ui.add(egui::Label::new(egui::RichText::new(self.note).size(SMALL).color(p.caution)))
-                        .on_hover_text("Pictures carry no scale: millimeters are assumed");
-                }
                 if wide {
                     asked = self.buttons(ui).or(asked);
                 } else {

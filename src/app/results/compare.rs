@@ -1,28 +1,26 @@
-//! Any two imprints of a touch against each other: what each side is, their figures, clouds and poses.
+//! Any two imprints of a touch against each other: what each side is, their figures and poses.
 
 use std::borrow::Cow;
 use std::sync::Arc;
 
 use super::super::jobs::{Job, Lane};
 use super::super::keys::{
-    CloudDifferenceKey, CloudKey, ComparedKey, ImprintKey, ImprintSource, MaskKey, MeanKey, MetersKey, PictureKey,
-    PoseKey, PredictionKey, ShiftMode, TouchKey, VersusKey,
+    CloudKey, ComparedKey, ComparisonKey, ImprintKey, ImprintSource, MaskKey, MeanKey, MetersKey, PictureKey, PoseKey,
+    PredictionKey, ShiftMode, TouchKey,
 };
 use super::super::pane::Demand;
 use super::super::results::{Computes, Demands};
 use super::super::services::SharedServices;
-use super::super::state::settings::versus::{Versus, VersusMode};
+use super::super::state::settings::compare::{CompareChoice, CompareMode};
 use super::super::state::{Absent, Lookup, State};
 use super::super::{recipe, results};
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::rig::PadId;
 use touch2touch_core::sample::Sample;
 use touch2touch_pipeline::compare::depict::mean;
-use touch2touch_pipeline::compare::deviation::{CloudDifference, cloud_difference};
 use touch2touch_pipeline::compare::subject::{MadeFrom, RecipeChange, Subject};
 use touch2touch_pipeline::compare::{Beside, Comparison, Depicted, between, tile_of};
 use touch2touch_pipeline::error::TaskError;
-use touch2touch_pipeline::steps::cloud::Clouds;
 use touch2touch_pipeline::steps::pose::PoseResult;
 use touch2touch_pipeline::steps::prediction::Prediction;
 
@@ -88,7 +86,7 @@ impl Part {
     }
 }
 
-impl Computes for VersusKey {
+impl Computes for ComparisonKey {
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Comparison>> {
         let touch = self.a.touch();
         let parts = [Part::of(&self.a, state)?, Part::of(&self.b, state)?];
@@ -106,14 +104,6 @@ impl Computes for VersusKey {
             let [a, b] = parts.each_ref().map(|part| part.depicted(&sample, touch.finger, tile.as_ref()));
             between(&a?, &b?, &sample, touch.finger)
         }))
-    }
-}
-
-impl Computes for CloudDifferenceKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<CloudDifference>> {
-        let cloud = |key: &CloudKey| state.results.clouds.get(key).cloned();
-        let (a, b) = (cloud(&self.a)?, cloud(&self.b)?);
-        Some(Job::new(Lane::Compute, "Distances between clouds", move |_| Ok(cloud_difference(&a, &b))))
     }
 }
 
@@ -196,7 +186,7 @@ pub fn subject<'a>(state: &'a State, subject: &Subject, finger: PadId) -> Lookup
 /// One subject against another of a finger.
 pub fn subjects_compared<'a>(state: &'a State, a: &Subject, b: &Subject, finger: PadId) -> Lookup<'a, Comparison> {
     match (subject_key(state, a, finger), subject_key(state, b, finger)) {
-        (Ok(a), Ok(b)) => state.look(VersusKey { a, b }).value(),
+        (Ok(a), Ok(b)) => state.look(ComparisonKey { a, b }).value(),
         (Err(absent), _) | (_, Err(absent)) => Lookup::Absent(absent),
     }
 }
@@ -212,13 +202,6 @@ fn subject_cloud(state: &State, subject: &Subject) -> Result<CloudKey, Vec<MaskK
             results::automatic_cloud(state, fingers)
         }
     }
-}
-
-/// The surface points of a subject, where they are there, with their recipe.
-pub(crate) fn subject_points<'a>(state: &'a State, subject: &Subject) -> Option<(CloudKey, &'a Clouds)> {
-    let key = subject_cloud(state, subject).ok()?;
-    let found = state.results.clouds.get(&key)?.surface();
-    Some((key, found))
 }
 
 fn subject_pose_key(state: &State, subject: &Subject) -> Option<PoseKey> {
@@ -244,24 +227,13 @@ pub fn subject_pose<'a>(state: &'a State, subject: &Subject) -> Option<&'a PoseR
     state.results.poses.get(&subject_pose_key(state, subject)?).map(|pose| &**pose)
 }
 
-/// The distances of the points of one subject from those of another, where they are there, with their key.
-pub fn subjects_apart<'a>(
-    state: &'a State,
-    a: &Subject,
-    b: &Subject,
-) -> Option<(CloudDifferenceKey, &'a CloudDifference)> {
-    let key = CloudDifferenceKey { a: subject_cloud(state, a).ok()?, b: subject_cloud(state, b).ok()? };
-    let found = state.results.apart.get(&key)?;
-    Some((key, found))
-}
-
 /// Asks for what the pane of the comparison shows and is not there.
-pub(crate) fn want_versus(wants: &mut Demands<'_>) {
+pub(crate) fn want_compared(wants: &mut Demands<'_>) {
     let state = wants.state;
-    if !state.needs(Demand::Versus) || results::sample(state).ready().is_none() {
+    if !state.needs(Demand::Compare) || results::sample(state).ready().is_none() {
         return;
     }
-    let Versus { a, b, mode } = state.settings.compared();
+    let CompareChoice { a, b, mode } = state.settings.compared();
     let both = [a, b];
     let posed = pose_absent(state).is_none();
     let shown = state.fingers();
@@ -277,9 +249,9 @@ pub(crate) fn want_versus(wants: &mut Demands<'_>) {
         let measured = with(&Subject::Measured);
         for (a, b) in [(&a, &b), (&a, &measured), (&b, &measured)] {
             if let (Some(a), Some(b)) = (a, b)
-                && (a != b || mode == VersusMode::Difference)
+                && (a != b || mode == CompareMode::Difference)
             {
-                wants.ask(VersusKey { a: a.clone(), b: b.clone() });
+                wants.ask(ComparisonKey { a: a.clone(), b: b.clone() });
             }
         }
     }
@@ -289,14 +261,6 @@ pub(crate) fn want_versus(wants: &mut Demands<'_>) {
     }
     for subject in &both {
         want_subject_place(wants, subject);
-    }
-    let clouds = both.each_ref().map(|subject| subject_cloud(state, subject).ok());
-    if let [Some(a), Some(b)] = clouds
-        && mode == VersusMode::Apart
-        && state.results.clouds.contains(&a)
-        && state.results.clouds.contains(&b)
-    {
-        wants.ask(CloudDifferenceKey { a, b });
     }
 }
 
@@ -373,7 +337,7 @@ pub fn comparison(state: &State, finger: PadId) -> Lookup<'_, Comparison> {
     if results::bubble(state, finger).ready().is_none() {
         return results::bubble(state, finger).without();
     }
-    state.look(VersusKey::measured(recipe.clone(), state.settings.shift)).value()
+    state.look(ComparisonKey::measured(recipe.clone(), state.settings.shift)).value()
 }
 
 pub(crate) fn want_comparison(wants: &mut Demands<'_>, finger: PadId, touch: TouchKey) {
@@ -381,6 +345,6 @@ pub(crate) fn want_comparison(wants: &mut Demands<'_>, finger: PadId, touch: Tou
     let Some(recipe) = results::shown(state, touch) else { return };
     let there = |source| results::imprint(state, source, finger).ready().is_some();
     if there(ImprintSource::Measured) && there(ImprintSource::Predicted) {
-        wants.ask(VersusKey::measured(recipe.clone(), state.settings.shift));
+        wants.ask(ComparisonKey::measured(recipe.clone(), state.settings.shift));
     }
 }

@@ -2,7 +2,6 @@
 
 mod choose;
 mod figures;
-mod space;
 
 use crate::app::results;
 use crate::app::settings::prefer;
@@ -10,20 +9,20 @@ use eframe::egui::{self, Align2, Color32, Rect, Sense, Stroke, Ui, UiBuilder, po
 use strum::IntoEnumIterator as _;
 
 use super::images::link::Link;
-use super::images::{absent_text, bar, failed, finger_text, hover, map_of, range_of, scale_note};
+use super::images::{absent_text, bar, canvas, failed, finger_text, hover, paint_depth, scale_note};
 use crate::app::action::{Action, with_keys};
-use crate::app::keys::VersusKey;
+use crate::app::keys::ComparisonKey;
 use crate::app::pane::Pane;
-use crate::app::settings::{Versus, VersusMode};
+use crate::app::settings::{CompareChoice, CompareMode};
 use crate::app::state::Lookup;
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{Palette, SMALL};
 use crate::ui::parts::widget::colorbar;
-use crate::ui::parts::widget::image_canvas::{CanvasOutput, ImageCanvas, Primary, shows_squares};
+use crate::ui::parts::widget::image_canvas::{CanvasOutput, Primary, shows_squares};
 use crate::ui::parts::widget::texture::{Histogram, depth_image};
 use touch2touch_core::colormap::{ColorMap, Range};
 use touch2touch_core::grid::DepthMap;
-use touch2touch_core::rig::PadId;
+use touch2touch_core::rig::{PadId, SensorKind};
 use touch2touch_core::units;
 use touch2touch_pipeline::compare::subject::Subject;
 
@@ -31,13 +30,11 @@ use touch2touch_pipeline::compare::subject::Subject;
 pub(crate) struct Memory {
     /// Position of the wipe's line, as a share of the picture's width.
     wipe: f32,
-    /// The 3D view.
-    space: space::Space,
 }
 
 impl Default for Memory {
     fn default() -> Self {
-        Self { wipe: 0.5, space: space::Space::default() }
+        Self { wipe: 0.5 }
     }
 }
 
@@ -49,25 +46,25 @@ enum Letter {
 }
 
 impl Letter {
-    fn of(self, versus: &Versus) -> &Subject {
+    fn of(self, chosen: &CompareChoice) -> &Subject {
         match self {
-            Self::A => &versus.a,
-            Self::B => &versus.b,
+            Self::A => &chosen.a,
+            Self::B => &chosen.b,
         }
     }
 }
 
 /// The color of one of the two: that of its side where it has one, and never that of the other.
-fn color(p: &Palette, versus: &Versus, letter: Letter) -> Color32 {
+fn color(p: &Palette, chosen: &CompareChoice, letter: Letter) -> Color32 {
     let (own, other) = match letter {
-        Letter::A => (&versus.a, &versus.b),
-        Letter::B => (&versus.b, &versus.a),
+        Letter::A => (&chosen.a, &chosen.b),
+        Letter::B => (&chosen.b, &chosen.a),
     };
     match (own, letter) {
         (Subject::Measured, _) if *other != Subject::Measured || letter == Letter::A => p.truth,
         (_, Letter::A) => p.prediction,
         _ if *other == Subject::Measured => p.prediction,
-        _ => p.pins[0],
+        _ => p.second,
     }
 }
 
@@ -78,21 +75,17 @@ fn flickers(ui: &Ui) -> bool {
 }
 
 pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
-    let versus = cx.state.settings.compared();
+    let chosen = cx.state.settings.compared();
     egui::Frame::new().inner_margin(egui::Margin::symmetric(6, 3)).show(ui, |ui| {
-        header(cx, ui, &versus);
+        header(cx, ui, &chosen);
         // The error's figures stand in the metrics, and in its corner.
-        if !versus.is_error() {
-            figures::show(cx, ui, &versus);
+        if !chosen.is_error() {
+            figures::show(cx, ui, &chosen);
         }
     });
     let flipped = flickers(ui);
     let full = ui.available_rect_before_wrap();
     ui.advance_cursor_after_rect(full);
-    if versus.mode.is_3d() {
-        let mut child = ui.new_child(UiBuilder::new().max_rect(full).id_salt("compared in 3D"));
-        return space::show(cx, &mut child, &mut memory.space, &versus, flipped);
-    }
     let area = full.with_max_y((full.bottom() - colorbar::HEIGHT).max(full.top() + 16.0));
     let shown = cx.state.fingers();
     let fingers: Vec<PadId> = cx.state.rig().pads().filter(|f| shown.contains(f)).collect();
@@ -100,8 +93,8 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
     let mut histogram = None;
     for (i, finger) in fingers.iter().enumerate() {
         let rect = Rect::from_min_size(area.min + vec2(0.0, height * i as f32), vec2(area.width(), height - 1.0));
-        let parts = match versus.mode {
-            VersusMode::Side => {
+        let parts = match chosen.mode {
+            CompareMode::Side => {
                 let half = vec2((rect.width() * 0.5 - 0.5).max(8.0), rect.height());
                 let right = Rect::from_min_size(pos2(rect.right() - half.x, rect.top()), half);
                 vec![(Letter::A, Rect::from_min_size(rect.min, half)), (Letter::B, right)]
@@ -111,9 +104,9 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
         for (letter, rect) in parts {
             let mut child = ui.new_child(UiBuilder::new().max_rect(rect).id_salt(("compared", *finger, letter)));
             child.set_clip_rect(rect.intersect(ui.clip_rect()));
-            let drawn = match versus.mode {
-                VersusMode::Difference => difference(cx, &mut child, &versus, *finger),
-                _ => picture(cx, &mut child, memory, &versus, letter, *finger, flipped),
+            let drawn = match chosen.mode {
+                CompareMode::Difference => difference(cx, &mut child, &chosen, *finger),
+                _ => picture(cx, &mut child, memory, &chosen, letter, *finger, flipped),
             };
             histogram = drawn.or(histogram);
         }
@@ -121,28 +114,28 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
     let rect = Rect::from_min_max(pos2(full.left(), area.bottom()), full.max);
     ui.painter().rect_filled(rect, 0.0, cx.p.panel);
     let mut child = ui.new_child(UiBuilder::new().max_rect(rect.shrink2(vec2(6.0, 0.0))).id_salt("compared bar"));
-    match versus.mode {
-        VersusMode::Difference => bar::error_bar(cx, &mut child, histogram.as_ref()),
+    match chosen.mode {
+        CompareMode::Difference => bar::error_bar(cx, &mut child, histogram.as_ref()),
         _ => bar::color_bar(cx, &mut child, histogram.as_ref()),
     }
 }
 
 /// Choice of what is compared, and how.
-fn header(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus) {
+fn header(cx: &mut Cx<'_>, ui: &mut Ui, chosen: &CompareChoice) {
     ui.spacing_mut().item_spacing = vec2(3.0, 3.0);
     ui.spacing_mut().button_padding = vec2(4.0, 1.0);
     ui.style_mut().override_font_id = Some(egui::FontId::proportional(SMALL));
     let width = ui.available_width();
     ui.horizontal_wrapped(|ui| {
         for letter in [Letter::A, Letter::B] {
-            if let Some(subject) = choose::menu(cx, ui, versus, letter, (width - MODE - 14.0) / 2.0) {
+            if let Some(subject) = choose::list(cx, ui, chosen, letter, (width - MODE - 34.0) / 2.0) {
                 cx.push(match letter {
-                    Letter::A => prefer(move |s| s.versus_mut().a = subject.clone()),
-                    Letter::B => prefer(move |s| s.versus_mut().b = subject.clone()),
+                    Letter::A => prefer(move |s| s.compare_mut().a = subject.clone()),
+                    Letter::B => prefer(move |s| s.compare_mut().b = subject.clone()),
                 });
             }
         }
-        modes(cx, ui, versus);
+        modes(cx, ui, chosen);
     });
 }
 
@@ -150,29 +143,20 @@ fn header(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus) {
 const MODE: f32 = 64.0;
 
 /// Choice of the way, with the keys that stand for the rest.
-fn modes(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus) {
-    let combo = egui::ComboBox::from_id_salt("compared by").width(MODE).selected_text(versus.mode.name());
+fn modes(cx: &mut Cx<'_>, ui: &mut Ui, chosen: &CompareChoice) {
+    let combo = egui::ComboBox::from_id_salt("compared by").width(MODE).selected_text(chosen.mode.name());
     let response = combo.show_ui(ui, |ui| {
-        for mode in VersusMode::iter() {
-            if ui.selectable_label(versus.mode == mode, mode.name()).on_hover_text(mode.tooltip()).clicked() {
-                cx.push(prefer(move |s| s.versus_mut().mode = mode));
+        for mode in CompareMode::iter() {
+            if ui.selectable_label(chosen.mode == mode, mode.name()).on_hover_text(mode.tooltip()).clicked() {
+                cx.push(prefer(move |s| s.compare_mut().mode = mode));
             }
         }
         ui.separator();
         cx.action_button(ui, Action::SwapCompared, "Swap A and B");
     });
     let tip = "{} ([[compare_mode]]: next, [[swap_compared]]: swap, hold F: B in the place of A)";
-    let tip = with_keys(&tip.replace("{}", versus.mode.tooltip()));
+    let tip = with_keys(&tip.replace("{}", chosen.mode.tooltip()));
     response.response.accessible_name("Comparison").on_hover_text(tip);
-}
-
-/// The canvas of a picture of `size` pixels, moved together with all bubble images.
-fn canvas(cx: &mut Cx<'_>, ui: &mut Ui, label: &str, size: [usize; 2]) -> CanvasOutput {
-    let mut view = cx.shared.views.bubble;
-    let canvas = ImageCanvas { label, size, rotated: false, primary: Primary::Pan, background: cx.p.canvas };
-    let output = canvas.show(ui, &mut view);
-    cx.shared.views.bubble = view;
-    output
 }
 
 /// Placeholder for a picture.
@@ -194,30 +178,30 @@ fn picture(
     cx: &mut Cx<'_>,
     ui: &mut Ui,
     memory: &mut Memory,
-    versus: &Versus,
+    chosen: &CompareChoice,
     letter: Letter,
     finger: PadId,
     flipped: bool,
 ) -> Option<Histogram> {
     let letter = if flipped { Letter::B } else { letter };
-    let subject = letter.of(versus);
+    let subject = letter.of(chosen);
     let lookup = results::subject(cx.state, subject, finger);
     let Some(depth) = lookup.shown() else {
         instead(cx, ui, lookup);
         return None;
     };
     let label = format!("Compare {letter:?} {}", cx.state.finger_name(finger));
-    let output = canvas(cx, ui, &label, depth.size());
+    let output = canvas(cx, ui, SensorKind::Depth, &label, depth.size(), Primary::Pan);
     let histogram = paint(cx, ui, &output, letter, subject, finger, depth)?;
-    let wiped = versus.mode == VersusMode::Wipe && !flipped;
+    let wiped = chosen.mode == CompareMode::Wipe && !flipped;
     if wiped {
-        wipe(cx, ui, memory, &output, versus, finger);
+        wipe(cx, ui, memory, &output, chosen, finger);
     }
-    over(cx, &output, versus, finger);
-    let strong = color(cx.p, versus, letter);
+    over(cx, &output, chosen, finger);
+    let strong = color(cx.p, chosen, letter);
     output.caption(Align2::LEFT_TOP, &format!("{letter:?}  {}", subject.label()), strong);
     if wiped {
-        output.caption(Align2::RIGHT_TOP, &format!("B  {}", versus.b.label()), color(cx.p, versus, Letter::B));
+        output.caption(Align2::RIGHT_TOP, &format!("B  {}", chosen.b.label()), color(cx.p, chosen, Letter::B));
     }
     output.caption(Align2::LEFT_BOTTOM, &finger_text(cx.state, finger), Color32::from_gray(235));
     output.caption(Align2::RIGHT_BOTTOM, scale_note(cx.state), crate::ui::parts::theme::DARK.caution);
@@ -235,18 +219,18 @@ fn paint(
     depth: &DepthMap,
 ) -> Option<Histogram> {
     let recipe = results::subject_key(cx.state, subject, finger).ok()?;
-    let squares = shows_squares(&output.map, ui.pixels_per_point());
-    let (map, range) = (map_of(cx.state), range_of(cx.state));
-    let key = (&recipe, map, range.lo.to_bits(), range.hi.to_bits());
-    let picture = cx.shared.textures.get(ui.ctx(), ("compared", letter, finger), key, squares, || {
-        (depth_image(depth, map, range), Histogram::of(depth.as_slice()))
-    });
-    output.paint(picture.texture.id(), Color32::WHITE);
-    picture.histogram.clone()
+    paint_depth(cx, ui, output, (("compared", letter, finger), &recipe), depth, Color32::WHITE)
 }
 
 /// B over A at the right of a line, which can be dragged.
-fn wipe(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, output: &CanvasOutput, versus: &Versus, finger: PadId) {
+fn wipe(
+    cx: &mut Cx<'_>,
+    ui: &mut Ui,
+    memory: &mut Memory,
+    output: &CanvasOutput,
+    chosen: &CompareChoice,
+    finger: PadId,
+) {
     const REACH: f32 = 6.0;
     let image = output.map.image_rect;
     let clip = output.painter.clip_rect();
@@ -263,7 +247,7 @@ fn wipe(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, output: &CanvasOutput
         memory.wipe = (memory.wipe + moved).clamp(0.0, 1.0);
     }
     let right = clip.with_min_x(x);
-    if let Some(depth) = results::subject(cx.state, &versus.b, finger).shown() {
+    if let Some(depth) = results::subject(cx.state, &chosen.b, finger).shown() {
         let painter = output.painter.with_clip_rect(right);
         let part = CanvasOutput {
             response: output.response.clone(),
@@ -272,7 +256,7 @@ fn wipe(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, output: &CanvasOutput
             painter,
             panning: output.panning,
         };
-        paint(cx, ui, &part, Letter::B, &versus.b, finger, depth);
+        paint(cx, ui, &part, Letter::B, &chosen.b, finger, depth);
     } else {
         output.painter.rect_filled(right, 0.0, cx.p.canvas.gamma_multiply(0.8));
     }
@@ -282,48 +266,48 @@ fn wipe(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, output: &CanvasOutput
 }
 
 /// A minus B.
-fn difference(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus, finger: PadId) -> Option<Histogram> {
-    for subject in [&versus.a, &versus.b] {
+fn difference(cx: &mut Cx<'_>, ui: &mut Ui, chosen: &CompareChoice, finger: PadId) -> Option<Histogram> {
+    for subject in [&chosen.a, &chosen.b] {
         let lookup = results::subject(cx.state, subject, finger);
         if lookup.shown().is_none() {
             instead(cx, ui, lookup);
             return None;
         }
     }
-    let lookup = results::subjects_compared(cx.state, &versus.a, &versus.b, finger);
+    let lookup = results::subjects_compared(cx.state, &chosen.a, &chosen.b, finger);
     let Some(compared) = lookup.shown() else {
         instead(cx, ui, lookup.map(|compared| &compared.error));
         return None;
     };
     let label = format!("A minus B {}", cx.state.finger_name(finger));
-    let output = canvas(cx, ui, &label, compared.error.size());
+    let output = canvas(cx, ui, SensorKind::Depth, &label, compared.error.size(), Primary::Pan);
     let squares = shows_squares(&output.map, ui.pixels_per_point());
-    let keys = [&versus.a, &versus.b].map(|subject| results::subject_key(cx.state, subject, finger));
+    let keys = [&chosen.a, &chosen.b].map(|subject| results::subject_key(cx.state, subject, finger));
     let [Ok(a), Ok(b)] = keys else { return None };
     let range = Range::symmetric(cx.shared.views.error_m());
-    let key = (VersusKey { a, b }, range.hi.to_bits());
+    let key = (ComparisonKey { a, b }, range.hi.to_bits());
     let picture = cx.shared.textures.get(ui.ctx(), ("compared difference", finger), key, squares, || {
         (depth_image(&compared.error, ColorMap::Diverging, range), Histogram::of(compared.error.as_slice()))
     });
     output.paint(picture.texture.id(), Color32::WHITE);
     let histogram = picture.histogram.clone();
-    over(cx, &output, versus, finger);
+    over(cx, &output, chosen, finger);
     let light = Color32::from_gray(235);
     // In a narrow pane the corners at the bottom have room for one line.
     let finger_text = finger_text(cx.state, finger).to_lowercase();
-    let text = format!("{} minus {}, {finger_text}", versus.a.label(), versus.b.label());
+    let text = format!("{} minus {}, {finger_text}", chosen.a.label(), chosen.b.label());
     output.caption(Align2::LEFT_TOP, &text, light);
     output.caption(Align2::RIGHT_TOP, scale_note(cx.state), crate::ui::parts::theme::DARK.caution);
     histogram
 }
 
 /// Overlay of every picture: GelSlim's window, cross-hair, the values under the pointer.
-fn over(cx: &mut Cx<'_>, output: &CanvasOutput, versus: &Versus, finger: PadId) {
+fn over(cx: &mut Cx<'_>, output: &CanvasOutput, chosen: &CompareChoice, finger: PadId) {
     if let Some(link) = Link::of(&cx.state.rig(), finger).filter(|_| cx.state.settings.footprint_visible) {
         output.dashed_rect(link.window, Color32::from_gray(235));
     }
     if let Some(px) = output.hovered {
-        readout(cx, output, versus, finger, px);
+        readout(cx, output, chosen, finger, px);
         hover(cx, finger, px);
     }
     if let Some(point) = cx.state.selection.hover.filter(|h| h.finger == finger) {
@@ -332,13 +316,13 @@ fn over(cx: &mut Cx<'_>, output: &CanvasOutput, versus: &Versus, finger: PadId) 
 }
 
 /// The values of both under the pointer.
-fn readout(cx: &mut Cx<'_>, output: &CanvasOutput, versus: &Versus, finger: PadId, px: [f32; 2]) {
+fn readout(cx: &mut Cx<'_>, output: &CanvasOutput, chosen: &CompareChoice, finger: PadId, px: [f32; 2]) {
     let Some((x, y)) = output.map.pixel(px) else { return };
     let value = |subject: &Subject| {
         let depth = results::subject(cx.state, subject, finger).shown()?;
         depth.get(x, y).copied().filter(|v| v.is_finite()).map(f64::from)
     };
-    let (a, b) = (value(&versus.a), value(&versus.b));
+    let (a, b) = (value(&chosen.a), value(&chosen.b));
     let text = |v: Option<f64>| v.map_or("–".to_owned(), units::text_mm);
     let difference = a.zip(b).map(|(a, b)| a - b);
     let note = scale_note(cx.state);
