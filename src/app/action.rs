@@ -268,7 +268,7 @@ macro_rules! actions {
             _ => does(prefer(|s| s.gel = next_of(&s.gel)));
         BothClouds, View, "Both clouds", "Shows measured and predicted points in each 3D view", [],
             state => does(WorkbenchCommand::SetBothClouds(!state.workbench.both_clouds));
-        CompareMode, View, "Next comparison", "Cycles through side by side, wipe and difference in Compare", [shift(K::F)],
+        CompareMode, View, "Next comparison", "Switches between side by side and difference in Compare", [shift(K::F)],
             _ => does(prefer(|s| s.compare_mut().mode = next_of(&s.compare_mut().mode)));
         SwapCompared, View, "Swap A and B", "Swaps A and B in Compare", [shift(K::R)],
             _ => does(prefer(|s| *s.compare_mut() = s.compare_mut().clone().swapped()));
@@ -299,9 +299,9 @@ macro_rules! actions {
         Screenshot, View, "Screenshot", "Saves a picture of the window to your Pictures folder", [plain(K::F12)],
             _ => ui(UiRequest::Screenshot);
         SavePane, View, "Save this pane", "Saves a picture of the pane under the pointer, with its bar and unit", [shift(K::F12)],
-            _ => ui(UiRequest::PanePicture { copied: false });
+            _ => ui(UiRequest::PanePicture { pane: None, copied: false });
         CopyPane, View, "Copy this pane", "Copies a picture of the pane under the pointer", [ctrl(K::F12)],
-            _ => ui(UiRequest::PanePicture { copied: true });
+            _ => ui(UiRequest::PanePicture { pane: None, copied: true });
         CopyHovered, View, "Copy the hovered value", "Copies the number under the pointer", [ctrl(K::C)],
             state => when(state.selection.hover.is_some(), ViewCommand::Ui(UiRequest::CopyHovered));
 

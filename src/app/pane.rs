@@ -133,7 +133,7 @@ macro_rules! panes {
                 }
             }
             compare { Compare {
-                    "Compare", "Any two imprints of this touch: side by side, wipe, difference",
+                    "Compare", "Any two imprints of this touch: side by side, or their difference",
                     Compare, needs [Compare], at [Inspect Bottom(1), Align Top(2), Evaluate Bottom(3), Adapt Bottom(3)]
             } }
             steps { Steps {

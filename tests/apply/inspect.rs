@@ -73,7 +73,7 @@ fn stepping_goes_both_ways_and_stops_at_the_ends() {
     assert_eq!(at(&bench), 0);
     {
         let shown = results::inspected(&bench.state).unwrap();
-        let first = shown.inspection.applied(run).unwrap();
+        let first = shown.inspection.step(run, 0).unwrap().grasp_from_object;
         assert_eq!(shown.step.grasp_from_object, first, "step 0 is the applied start");
         assert_eq!(shown.step.iteration, 0);
         assert!(shown.inspection.what_next(run, 0).contains("moving"));
@@ -117,7 +117,7 @@ fn a_start_is_a_run_of_its_own_and_the_pair_resets_it() {
     bench.settle();
     let inspection = results::inspection(&bench.state).ready().unwrap().clone();
     assert_eq!((inspection.num_runs(), inspection.requested(0)), (1, Some(start)));
-    let applied = inspection.applied(0).unwrap();
+    let applied = inspection.step(0, 0).unwrap().grasp_from_object;
     assert!((applied.theta_rad - start.theta_rad).abs() < 1e-9 && (applied.y_m - start.y_m).abs() < 1e-9);
     assert_eq!(results::inspected(&bench.state).unwrap().at, 0, "it is watched from where it began");
     // A start far from everything is a failure of this run alone.

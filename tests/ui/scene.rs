@@ -2,12 +2,10 @@
 
 use eframe::egui::Pos2;
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::action::Action;
 use touch2touch::app::command::WorkbenchCommand;
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::results;
 use touch2touch::app::settings::SceneLayer;
-use touch2touch::app::settings::prefer;
 use touch2touch::app::state::State;
 use touch2touch::app::workbench::Layer;
 use touch2touch_core::rig::lab;

@@ -69,11 +69,6 @@ impl Inspection {
         self.report().runs.get(run).map(|r| r.start)
     }
 
-    /// The pose it began at, `grasp_from_object`: not always the one asked for.
-    pub fn applied(&self, run: usize) -> Option<PlanarPose> {
-        self.steps(run).next().map(|s| s.grasp_from_object)
-    }
-
     /// The continuation after a step, in words: the reason to stop at the last one.
     pub fn what_next(&self, run: usize, at: usize) -> String {
         let (Some(here), last) = (self.step(run, at), self.num_steps(run).saturating_sub(1)) else {

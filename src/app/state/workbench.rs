@@ -29,8 +29,8 @@ impl Layer {
     /// The name on screen.
     pub fn name(self) -> &'static str {
         match self {
-            Self::None => "None",
-            Self::Residuals => "Residuals",
+            Self::None => "One color",
+            Self::Residuals => "Residual",
             Self::Reasons => "Pixels used",
             Self::Distance => "Distance",
             Self::Correspondences => "Pull lines",

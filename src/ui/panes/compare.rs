@@ -5,11 +5,10 @@ mod figures;
 
 use crate::app::results;
 use crate::app::settings::prefer;
-use eframe::egui::{self, Align2, Color32, Rect, Sense, Stroke, Ui, UiBuilder, pos2, vec2};
+use eframe::egui::{self, Align2, Color32, Rect, Ui, UiBuilder, pos2, vec2};
 use strum::IntoEnumIterator as _;
 
-use super::images::link::Link;
-use super::images::{absent_text, bar, canvas, failed, finger_text, hover, paint_depth, scale_note};
+use super::images::{absent_text, bar, canvas, failed, finger_text, hover, paint_depth, scale_note, window};
 use crate::app::action::{Action, with_keys};
 use crate::app::keys::ComparisonKey;
 use crate::app::pane::Pane;
@@ -26,17 +25,8 @@ use touch2touch_core::rig::{PadId, SensorKind};
 use touch2touch_core::units;
 use touch2touch_pipeline::compare::subject::Subject;
 
-/// Memory of the comparison.
-pub(crate) struct Memory {
-    /// Position of the wipe's line, as a share of the picture's width.
-    wipe: f32,
-}
-
-impl Default for Memory {
-    fn default() -> Self {
-        Self { wipe: 0.5 }
-    }
-}
+/// Nothing is kept between frames.
+pub(crate) type Memory = ();
 
 /// One of the two.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -74,7 +64,7 @@ fn flickers(ui: &Ui) -> bool {
     held && !ui.ctx().egui_wants_keyboard_input()
 }
 
-pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
+pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
     let chosen = cx.state.settings.compared();
     egui::Frame::new().inner_margin(egui::Margin::symmetric(6, 3)).show(ui, |ui| {
         header(cx, ui, &chosen);
@@ -99,14 +89,17 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
                 let right = Rect::from_min_size(pos2(rect.right() - half.x, rect.top()), half);
                 vec![(Letter::A, Rect::from_min_size(rect.min, half)), (Letter::B, right)]
             }
-            _ => vec![(Letter::A, rect)],
+            CompareMode::Difference => vec![(Letter::A, rect)],
         };
         for (letter, rect) in parts {
             let mut child = ui.new_child(UiBuilder::new().max_rect(rect).id_salt(("compared", *finger, letter)));
             child.set_clip_rect(rect.intersect(ui.clip_rect()));
             let drawn = match chosen.mode {
                 CompareMode::Difference => difference(cx, &mut child, &chosen, *finger),
-                _ => picture(cx, &mut child, memory, &chosen, letter, *finger, flipped),
+                CompareMode::Side => {
+                    let letter = if flipped { Letter::B } else { letter };
+                    picture(cx, &mut child, &chosen, letter, *finger)
+                }
             };
             histogram = drawn.or(histogram);
         }
@@ -116,7 +109,7 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
     let mut child = ui.new_child(UiBuilder::new().max_rect(rect.shrink2(vec2(6.0, 0.0))).id_salt("compared bar"));
     match chosen.mode {
         CompareMode::Difference => bar::error_bar(cx, &mut child, histogram.as_ref()),
-        _ => bar::color_bar(cx, &mut child, histogram.as_ref()),
+        CompareMode::Side => bar::color_bar(cx, &mut child, histogram.as_ref()),
     }
 }
 
@@ -173,17 +166,8 @@ fn instead(cx: &mut Cx<'_>, ui: &mut Ui, lookup: Lookup<'_, DepthMap>) {
     }
 }
 
-/// The picture of one of the two; with a wipe, that of B lies over it at the right of the line.
-fn picture(
-    cx: &mut Cx<'_>,
-    ui: &mut Ui,
-    memory: &mut Memory,
-    chosen: &CompareChoice,
-    letter: Letter,
-    finger: PadId,
-    flipped: bool,
-) -> Option<Histogram> {
-    let letter = if flipped { Letter::B } else { letter };
+/// The picture of one of the two.
+fn picture(cx: &mut Cx<'_>, ui: &mut Ui, chosen: &CompareChoice, letter: Letter, finger: PadId) -> Option<Histogram> {
     let subject = letter.of(chosen);
     let lookup = results::subject(cx.state, subject, finger);
     let Some(depth) = lookup.shown() else {
@@ -192,77 +176,15 @@ fn picture(
     };
     let label = format!("Compare {letter:?} {}", cx.state.finger_name(finger));
     let output = canvas(cx, ui, SensorKind::Depth, &label, depth.size(), Primary::Pan);
-    let histogram = paint(cx, ui, &output, letter, subject, finger, depth)?;
-    let wiped = chosen.mode == CompareMode::Wipe && !flipped;
-    if wiped {
-        wipe(cx, ui, memory, &output, chosen, finger);
-    }
+    let recipe = results::subject_key(cx.state, subject, finger).ok()?;
+    let slot = ("compared", letter, finger);
+    let histogram = paint_depth(cx, ui, &output, (slot, &recipe), depth, Color32::WHITE);
     over(cx, &output, chosen, finger);
     let strong = color(cx.p, chosen, letter);
     output.caption(Align2::LEFT_TOP, &format!("{letter:?}  {}", subject.label()), strong);
-    if wiped {
-        output.caption(Align2::RIGHT_TOP, &format!("B  {}", chosen.b.label()), color(cx.p, chosen, Letter::B));
-    }
     output.caption(Align2::LEFT_BOTTOM, &finger_text(cx.state, finger), Color32::from_gray(235));
     output.caption(Align2::RIGHT_BOTTOM, scale_note(cx.state), crate::ui::parts::theme::DARK.caution);
-    Some(histogram)
-}
-
-/// Paints the imprint of a subject; its histogram.
-fn paint(
-    cx: &mut Cx<'_>,
-    ui: &Ui,
-    output: &CanvasOutput,
-    letter: Letter,
-    subject: &Subject,
-    finger: PadId,
-    depth: &DepthMap,
-) -> Option<Histogram> {
-    let recipe = results::subject_key(cx.state, subject, finger).ok()?;
-    paint_depth(cx, ui, output, (("compared", letter, finger), &recipe), depth, Color32::WHITE)
-}
-
-/// B over A at the right of a line, which can be dragged.
-fn wipe(
-    cx: &mut Cx<'_>,
-    ui: &mut Ui,
-    memory: &mut Memory,
-    output: &CanvasOutput,
-    chosen: &CompareChoice,
-    finger: PadId,
-) {
-    const REACH: f32 = 6.0;
-    let image = output.map.image_rect;
-    let clip = output.painter.clip_rect();
-    let x = (image.left() + memory.wipe * image.width()).clamp(clip.left(), clip.right());
-    let handle = Rect::from_min_max(pos2(x - REACH, clip.top()), pos2(x + REACH, clip.bottom()));
-    let drag = ui.interact(handle, ui.scope_id().with("wipe"), Sense::drag());
-    let named = format!("Line between A and B, {}", cx.state.finger_name(finger));
-    drag.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Slider, true, &named));
-    if drag.hovered() || drag.dragged() {
-        ui.ctx().set_cursor_icon(egui::CursorIcon::ResizeHorizontal);
-    }
-    if drag.dragged() {
-        let moved = drag.drag_delta().x / image.width().max(1.0);
-        memory.wipe = (memory.wipe + moved).clamp(0.0, 1.0);
-    }
-    let right = clip.with_min_x(x);
-    if let Some(depth) = results::subject(cx.state, &chosen.b, finger).shown() {
-        let painter = output.painter.with_clip_rect(right);
-        let part = CanvasOutput {
-            response: output.response.clone(),
-            map: output.map,
-            hovered: output.hovered,
-            painter,
-            panning: output.panning,
-        };
-        paint(cx, ui, &part, Letter::B, &chosen.b, finger, depth);
-    } else {
-        output.painter.rect_filled(right, 0.0, cx.p.canvas.gamma_multiply(0.8));
-    }
-    let line = clip.y_range();
-    output.painter.vline(x, line, Stroke::new(4.0, Color32::from_black_alpha(140)));
-    output.painter.vline(x, line, Stroke::new(2.0, Color32::WHITE));
+    histogram
 }
 
 /// A minus B.
@@ -303,9 +225,7 @@ fn difference(cx: &mut Cx<'_>, ui: &mut Ui, chosen: &CompareChoice, finger: PadI
 
 /// Overlay of every picture: GelSlim's window, cross-hair, the values under the pointer.
 fn over(cx: &mut Cx<'_>, output: &CanvasOutput, chosen: &CompareChoice, finger: PadId) {
-    if let Some(link) = Link::of(&cx.state.rig(), finger).filter(|_| cx.state.settings.footprint_visible) {
-        output.dashed_rect(link.window, Color32::from_gray(235));
-    }
+    window(cx, output, finger);
     if let Some(px) = output.hovered {
         readout(cx, output, chosen, finger, px);
         hover(cx, finger, px);

@@ -1,7 +1,7 @@
 //! The image panes: GelSlim, measured and predicted imprint. Linked pan, zoom and cross-hair.
 
 pub(crate) mod bar;
-pub(crate) mod link;
+mod link;
 mod paint;
 
 use std::hash::Hash;
@@ -430,7 +430,7 @@ fn depth_pane(
     if !paint::is_bared(ui) {
         paint::mask(cx, ui, memory, &output, source, finger);
     }
-    marks(cx, &output, finger);
+    window(cx, &output, finger);
     if let Some(px) = output.hovered {
         readout(cx, &output, pane, finger, depth, px);
         hover(cx, finger, px);
@@ -474,7 +474,7 @@ fn preview_image(cx: &mut Cx<'_>, ui: &mut Ui, finger: PadId, preview: &Arc<Prev
     let output = canvas(cx, ui, SensorKind::Depth, &label, depth.size(), Primary::Pan);
     let recipe = (&preview.recipe, preview.picture.step);
     let histogram = paint_depth(cx, ui, &output, ((pane, finger), recipe), depth, Color32::WHITE);
-    marks(cx, &output, finger);
+    window(cx, &output, finger);
     if let Some(px) = output.hovered {
         readout(cx, &output, pane, finger, depth, px);
         hover(cx, finger, px);
@@ -485,8 +485,8 @@ fn preview_image(cx: &mut Cx<'_>, ui: &mut Ui, finger: PadId, preview: &Arc<Prev
     histogram
 }
 
-/// Marks on an imprint that a person can switch.
-fn marks(cx: &Cx<'_>, output: &CanvasOutput, finger: PadId) {
+/// The window of the GelSlim on an imprint, where it is shown.
+pub(crate) fn window(cx: &Cx<'_>, output: &CanvasOutput, finger: PadId) {
     if let Some(link) = Link::of(&cx.state.rig(), finger).filter(|_| cx.state.settings.footprint_visible) {
         output.dashed_rect(link.window, Color32::from_gray(235));
     }
@@ -503,22 +503,15 @@ fn captions(cx: &Cx<'_>, output: &CanvasOutput, pane: Pane, finger: PadId) {
     }
 }
 
-/// The value under the pointer, in millimeters and in the unit that is stored.
+/// The value under the pointer, in millimeters.
 fn readout(cx: &mut Cx<'_>, output: &CanvasOutput, pane: Pane, finger: PadId, depth: &DepthMap, px: [f32; 2]) {
     let Some((x, y)) = output.map.pixel(px) else { return };
     let Some(v) = depth.get(x, y).copied() else { return };
     let name = pane.title();
     let note = scale_note(cx.state);
     let note = if note.is_empty() { String::new() } else { format!(" ({note})") };
-    cx.shared.readout = Some(if v.is_finite() {
-        format!(
-            "{name} {} ({x}, {y})   {}{note}   {v:.6} m",
-            cx.state.finger_name(finger),
-            units::text_mm(f64::from(v))
-        )
-    } else {
-        format!("{name} {} ({x}, {y})   no measurement", cx.state.finger_name(finger))
-    });
+    let value = if v.is_finite() { format!("{}{note}", units::text_mm(f64::from(v))) } else { "no measurement".into() };
+    cx.shared.readout = Some(format!("{name} {} ({x}, {y})   {value}", cx.state.finger_name(finger)));
 }
 
 /// The small square in the color of a side, beside the pane's title.

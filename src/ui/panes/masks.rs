@@ -15,11 +15,10 @@ use crate::app::keys::ImprintSource;
 use crate::app::labels::Review;
 use crate::app::settings::{BRUSH_RADIUS_PX, CLEAN_MM, MaskSettings, MaskTool, ToolRow};
 use crate::app::state::Lookup;
-use crate::app::workbench::SceneTool;
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{CONTACT, IGNORED, PROPOSED, SMALL, caption, section};
 use crate::ui::parts::widget::icon::{self, Icon};
-use touch2touch_core::label::{DrawTool, Layers, Paint};
+use touch2touch_core::label::{DrawTool, Paint};
 use touch2touch_core::units;
 use touch2touch_pipeline::labels::MAX_NOTE;
 
@@ -52,9 +51,8 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
             source::show(cx, ui);
             fold(ui, "Clean up", "One-click clean-ups of the mask", |ui| clean_ups(cx, ui));
             note(cx, ui, memory);
-            fold(ui, "More", "Opacity, drawing in 3D, which mask is edited", |ui| {
+            fold(ui, "More", "Opacity, which mask is edited", |ui| {
                 opacity(cx, ui);
-                in_3d(cx, ui);
                 correct(cx, ui);
             });
             progress::show(cx, ui);
@@ -117,24 +115,6 @@ fn tools(cx: &mut Cx<'_>, ui: &mut Ui) {
                 }
             });
         });
-    });
-}
-
-/// Drawing on the points of the 3D views, and what that reaches.
-fn in_3d(cx: &mut Cx<'_>, ui: &mut Ui) {
-    ui.horizontal_wrapped(|ui| {
-        ui.spacing_mut().item_spacing.x = 4.0;
-        ui.label(caption("In 3D", cx.p));
-        let on = cx.state.workbench.tool == SceneTool::Paint;
-        cx.action_switch(ui, Action::PaintIn3d, "draw", on);
-        let now = cx.state.settings.mask.layers;
-        for (layers, text) in [(Layers::Front, "front-most"), (Layers::All, "all layers")] {
-            let button = ui.add(egui::Button::selectable(now == layers, text));
-            let tip = format!("Drawing in 3D marks {}", layers.name());
-            if button.on_hover_text(Action::PaintLayers.behind(&tip)).clicked() && now != layers {
-                cx.act(Action::PaintLayers);
-            }
-        }
     });
 }
 

@@ -76,8 +76,6 @@ pub(crate) struct Memory {
     moved: Option<u64>,
     /// Counts what was made for the renderer.
     revision: u64,
-    /// True where the legend is unfolded.
-    legend_open: bool,
 }
 
 impl Memory {

@@ -46,7 +46,9 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
         let lookup = results::inspection(cx.state);
         match (lookup, results::inspected(cx.state)) {
             (Lookup::Failed(err), _) => {
-                let (why, own) = (err.why.clone(), cx.state.inspect.start.is_some());
+                // What keeps the pose from being there is said in the 3D view.
+                let own = cx.state.inspect.start.is_some();
+                let why = if own { err.why.clone() } else { String::new() };
                 let action = own.then(|| (Action::OwnStarts.name(), Action::OwnStarts.tooltip()));
                 within(ui, body, |ui| {
                     if empty::show(ui, "No pose to replay", &why, action) {

@@ -107,14 +107,12 @@ pub(crate) struct Views {
     pub bubble: ViewTransform,
     /// Half the range of the error's colors, millimeters.
     pub error_mm: f32,
-    /// Counts how often bubble images were fitted: a 3D view beside them follows.
-    pub fits: u64,
 }
 
 impl Default for Views {
     fn default() -> Self {
         let view = ViewTransform::default();
-        Self { gel: view, bubble: view, error_mm: 4.0, fits: 0 }
+        Self { gel: view, bubble: view, error_mm: 4.0 }
     }
 }
 
@@ -126,7 +124,6 @@ impl Views {
         }
         if only != Some(SensorKind::Color) {
             self.bubble = ViewTransform::default();
-            self.fits += 1;
         }
     }
 

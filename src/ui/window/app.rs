@@ -336,7 +336,6 @@ impl StudioApp {
     fn perform(&mut self, ctx: &egui::Context, request: UiRequest) {
         match request {
             UiRequest::PickFolder => self.shared.dialogs.open(Purpose::Folder, ctx),
-            UiRequest::PickFile => self.shared.dialogs.open(Purpose::File, ctx),
             UiRequest::PickTableFolder => self.shared.dialogs.open(Purpose::Table, ctx),
             UiRequest::PickOutput(output) => self.shared.dialogs.open(Purpose::Output(output), ctx),
             UiRequest::PickMasks => self.shared.dialogs.open(Purpose::Masks, ctx),
@@ -360,13 +359,11 @@ impl StudioApp {
             }
             UiRequest::ShowPane(pane) => self.show_pane(pane),
             UiRequest::Screenshot => self.shoot(ctx, None, false),
-            UiRequest::PanePicture { copied } => {
-                let part = self.panes.hovered.and_then(|pane| self.panes.places.get(&pane).copied());
-                self.shoot(ctx, part, copied);
-            }
-            UiRequest::PictureOf { pane, copied } => {
-                if let Some(place) = self.panes.places.get(&pane).copied() {
-                    self.shoot(ctx, Some(place), copied);
+            UiRequest::PanePicture { pane, copied } => {
+                let place = pane.or(self.panes.hovered).and_then(|pane| self.panes.places.get(&pane).copied());
+                // Of no pane it is the whole window, unless that pane was asked for.
+                if place.is_some() || pane.is_none() {
+                    self.shoot(ctx, place, copied);
                 }
             }
             UiRequest::ToggleFullscreen => {
@@ -553,7 +550,7 @@ impl eframe::App for StudioApp {
             bars::drop_overlay(&cx, &ctx);
             if let Some((purpose, path)) = cx.shared.dialogs.show(&ctx) {
                 cx.push(match purpose {
-                    Purpose::Folder | Purpose::File => Command::Library(LibraryCommand::Open(Place::Path(path))),
+                    Purpose::Folder => Command::Library(LibraryCommand::Open(Place::Path(path))),
                     Purpose::Output(output) => Command::Export(ExportCommand::Write(output, path)),
                     Purpose::Labels => Command::Labels(LabelsCommand::Unsaved(UnsavedCommand::Elsewhere(path))),
                     Purpose::Masks => Command::Export(ExportCommand::AskImport(Some(path))),

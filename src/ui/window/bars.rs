@@ -265,6 +265,10 @@ pub(crate) fn hint(cx: &mut Cx<'_>, ctx: &egui::Context) {
     if cx.state.settings.hint_dismissed || !demo {
         return;
     }
+    // Whoever has gone on to another pair needs it no longer.
+    if cx.state.selection.pair.is_some_and(|pair| cx.state.library.order.first() != Some(&pair)) {
+        return cx.push(prefer(|s| s.hint_dismissed = true));
+    }
     let area = egui::Area::new(egui::Id::unique("hint")).anchor(egui::Align2::CENTER_BOTTOM, vec2(0.0, -44.0));
     area.show(ctx, |ui| {
         egui::Frame::popup(ui.style()).fill(cx.p.panel).inner_margin(12).show(ui, |ui| {

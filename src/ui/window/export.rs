@@ -62,7 +62,7 @@ pub(crate) fn menu(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane) {
         (true, "Copy as picture", Action::CopyPane.behind("Copies this pane as a picture")),
     ] {
         if ui.button(text).on_hover_text(tip).clicked() {
-            cx.push(ViewCommand::Ui(UiRequest::PictureOf { pane, copied }));
+            cx.push(ViewCommand::Ui(UiRequest::PanePicture { pane: Some(pane), copied }));
             ui.close();
         }
     }

@@ -36,7 +36,6 @@ pub enum Metric {
 struct Row {
     metric: Metric,
     name: &'static str,
-    short: &'static str,
     key: &'static str,
     tip: &'static str,
     unit: &'static str,
@@ -50,7 +49,6 @@ struct Row {
 const PLAIN: Row = Row {
     metric: Metric::Angle,
     name: "",
-    short: "",
     key: "",
     tip: "",
     unit: "",
@@ -67,7 +65,6 @@ static ROWS: &[Row] = &[
     Row {
         metric: Metric::Angle,
         name: "Angle error",
-        short: "angle",
         key: "angle",
         tip: "Error of the in-hand angle from the contact of both fingers, degrees",
         unit: "°",
@@ -79,7 +76,6 @@ static ROWS: &[Row] = &[
     Row {
         metric: Metric::Verdict,
         name: "Verdict",
-        short: "verdict",
         key: "verdict",
         tip: "How much the pose can be relied on, without the truth: good, check or wrong",
         decimals: 0,
@@ -90,7 +86,6 @@ static ROWS: &[Row] = &[
     Row {
         metric: Metric::Psnr,
         name: "PSNR",
-        short: "PSNR",
         key: "psnr",
         tip: "Against the measured imprint, dB; peak 22.5 mm, or both scaled to 0..1 where the scale is assumed",
         of: |grasp| psnr(&[grasp], |image| Some(image.error)),
@@ -99,7 +94,6 @@ static ROWS: &[Row] = &[
     Row {
         metric: Metric::Ssim,
         name: "SSIM",
-        short: "SSIM",
         key: "ssim",
         tip: "Structural similarity; range of the tool's predictions (the lab's), or both scaled to 0..1 where the scale is assumed",
         of: |grasp| mean(grasp.images.iter().filter_map(|image| image.ssim)),
@@ -108,7 +102,6 @@ static ROWS: &[Row] = &[
     Row {
         metric: Metric::PsnrNoiseFree,
         name: "PSNR noise-free",
-        short: "clean",
         key: "psnr-clean",
         tip: "Against the simulator's imprint without camera noise, dB",
         of: |grasp| psnr(&[grasp], |image| image.noise_free),
@@ -117,7 +110,6 @@ static ROWS: &[Row] = &[
     Row {
         metric: Metric::Disagreement,
         name: "Hand against model",
-        short: "hand/model",
         key: "disagreement",
         tip: "What the mask drawn by hand and the mask model's do not share: 1 - Dice of the worse finger, percent",
         larger_is_better: false,
@@ -127,7 +119,6 @@ static ROWS: &[Row] = &[
     Row {
         metric: Metric::Unsure,
         name: "Model unsure",
-        short: "unsure",
         key: "unsure",
         tip: "Share of the pixels to which the mask model gives a probability of 0.25 to 0.75, worse finger, percent",
         larger_is_better: false,
@@ -144,11 +135,6 @@ impl Metric {
     /// The name on screen.
     pub fn name(self) -> &'static str {
         self.row().name
-    }
-
-    /// The name in a word, for the head of a column.
-    pub fn short(self) -> &'static str {
-        self.row().short
     }
 
     /// The word in the filter of the list.

@@ -11,8 +11,6 @@ use touch2touch_pipeline::compare::subject::Subject;
 pub enum CompareMode {
     /// A at the left, B at the right.
     Side,
-    /// A at the left of a line that is dragged, B at the right of it.
-    Wipe,
     /// A minus B.
     #[default]
     Difference,
@@ -23,7 +21,6 @@ impl CompareMode {
     pub fn name(self) -> &'static str {
         match self {
             Self::Side => "Side",
-            Self::Wipe => "Wipe",
             Self::Difference => "Difference",
         }
     }
@@ -32,7 +29,6 @@ impl CompareMode {
     pub fn tooltip(self) -> &'static str {
         match self {
             Self::Side => "A on the left, B on the right",
-            Self::Wipe => "A left, B right of a line that you drag",
             Self::Difference => "A minus B in millimeters: blue where A is shallower, red where it is deeper",
         }
     }

@@ -135,15 +135,11 @@ pub(super) fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
 /// A column of figures: heading, tooltip, value.
 type FitColumn = (&'static str, &'static str, fn(&Scored) -> Option<String>);
 
-const FIGURES: [FitColumn; 7] = [
+const FIGURES: [FitColumn; 5] = [
     ("PSNR dB", "Peak 22.5 mm; image pairs, which carry no scale, are both stretched to 0–1", |s| {
         Some(format!("{:.1} ± {:.1}", s.psnr_db?, s.psnr_spread_db?))
     }),
     ("SSIM", "Structural similarity, on the same images as PSNR", |s| Some(format!("{:.2}", s.ssim?))),
-    ("unscaled dB", "PSNR of the images as they are, not stretched", |s| Some(format!("{:.1}", s.psnr_raw_db?))),
-    ("shape dB", "PSNR after the best linear fit of the values: how good the shape alone is", |s| {
-        Some(format!("{:.1}", s.psnr_line_db?))
-    }),
     ("inside dB", "PSNR inside the GelSlim window", |s| Some(format!("{:.1}", s.seen?.psnr_db?))),
     ("outside dB", "PSNR outside the GelSlim window", |s| Some(format!("{:.1}", s.invented?.psnr_db?))),
     ("angle °", "Mean error of the in-hand angle; for image pairs against the angle from the measured imprint", |s| {

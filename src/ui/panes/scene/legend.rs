@@ -3,8 +3,8 @@
 use crate::app::results;
 use crate::app::settings::prefer;
 use eframe::egui::{
-    self, Align2, Button, Color32, DragValue, FontId, Painter, Rect, RichText, Role, Sense, Stroke, Ui, UiBuilder,
-    WidgetInfo, pos2, vec2,
+    self, Align2, Button, Color32, DragValue, FontId, Painter, Popup, PopupCloseBehavior, Rect, RichText, Role, Sense,
+    Stroke, Ui, UiBuilder, WidgetInfo, pos2, vec2,
 };
 use strum::IntoEnumIterator as _;
 
@@ -34,17 +34,13 @@ struct Row {
     text: String,
 }
 
-/// The list at the lower left corner of the `first` view, folded to its colors until somebody asks; and the bar of the
-/// color map at the lower right one.
-pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, source: ImprintSource, rect: Rect, first: bool) {
-    if first && memory.legend_open {
-        unfolded(cx, ui, memory, source, rect);
-    } else if first {
-        folded(cx, ui, memory, source, rect);
+/// The list at the lower left corner of the `first` view; and the bar of the color map at the lower right one.
+pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &Memory, source: ImprintSource, rect: Rect, first: bool) {
+    if first {
+        list(cx, ui, memory, source, rect);
     }
     let painted = memory.layer_colors[source as usize].is_some();
     match cx.state.workbench.layer {
-        Layer::Correspondences => steps::bar(cx, ui, memory, source, bar(rect)),
         Layer::Residuals if painted => residuals(cx, &ui.painter_at(rect), source, rect),
         Layer::Distance if painted => distances(cx, ui, source, rect),
         Layer::Distance if results::pose(cx.state, source).shown().is_some() => {
@@ -56,51 +52,31 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, source: Im
     }
 }
 
-/// The colors of what is drawn, in a row; a click unfolds the list.
-fn folded(cx: &Cx<'_>, ui: &mut Ui, memory: &mut Memory, source: ImprintSource, rect: Rect) {
+/// The colors of what is drawn, in a row; a click opens the list of names with their switches.
+fn list(cx: &mut Cx<'_>, ui: &mut Ui, memory: &Memory, source: ImprintSource, rect: Rect) {
     const DOT: f32 = 11.0;
-    let shown = |row: &Row| row.layer.is_none_or(|layer| cx.state.settings.scene.shows(layer));
-    let rows: Vec<Row> = rows(cx, memory, source).into_iter().filter(shown).collect();
-    let size = vec2(DOT * rows.len() as f32 + 8.0, 18.0);
+    let rows = rows(cx, memory, source);
+    let shown = |row: &&Row| row.layer.is_none_or(|layer| cx.state.settings.scene.shows(layer));
+    let drawn: Vec<&Row> = rows.iter().filter(shown).collect();
+    let size = vec2(DOT * drawn.len() as f32 + 8.0, 18.0);
     let place = Rect::from_min_size(pos2(rect.left() + 6.0, rect.bottom() - 6.0 - size.y), size);
     let response = ui.interact(place, ui.scope_id().with("legend"), Sense::click());
     response.widget_info(|| WidgetInfo::labeled(Role::Button, true, "Legend"));
     let fill = if response.hovered() { cx.p.control[1] } else { cx.p.canvas.gamma_multiply(0.6) };
     ui.painter().rect_filled(place, 9.0, fill);
-    for (i, row) in rows.iter().enumerate() {
+    for (i, row) in drawn.iter().enumerate() {
         let center = place.left_center() + vec2(4.0 + DOT * (i as f32 + 0.5), 0.0);
         ui.painter().circle_filled(center, 3.5, row.color);
     }
-    let clicked = response.clicked();
-    response.on_hover_ui(|ui| {
+    let response = response.on_hover_ui(|ui| {
         ui.label(RichText::new("Click to show or hide things").size(SMALL));
-        for row in &rows {
+        for row in &drawn {
             ui.label(RichText::new(&row.text).size(SMALL).color(row.color));
         }
     });
-    memory.legend_open |= clicked;
-}
-
-/// The whole list, with its switches.
-fn unfolded(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, source: ImprintSource, rect: Rect) {
-    let rows = rows(cx, memory, source);
-    // A small pane keeps its picture.
-    let most = ((rect.height() * 0.6) / ROW).floor().max(1.0) as usize;
-    let height = (rows.len().min(most) + 1) as f32 * ROW;
-    let place = Rect::from_min_size(pos2(rect.left() + 6.0, rect.bottom() - 6.0 - height), vec2(WIDTH, height));
-    ui.painter().rect_filled(place.expand(2.0), 3.0, cx.p.canvas.gamma_multiply(0.6));
-    let builder = UiBuilder::new().max_rect(place).id_salt("legend");
-    ui.scope_builder(builder, |ui| {
-        ui.spacing_mut().item_spacing = vec2(2.0, 0.0);
-        ui.spacing_mut().interact_size.y = ROW;
-        ui.spacing_mut().button_padding = vec2(2.0, 0.0);
-        let fold = Button::new(RichText::new("Fold").size(SMALL).color(cx.p.weak)).frame(false);
-        if ui.add(fold.min_size(vec2(0.0, ROW))).on_hover_text("Collapses the legend").clicked() {
-            memory.legend_open = false;
-        }
-        for row in rows.into_iter().take(most) {
-            line(cx, ui, source, &row);
-        }
+    Popup::menu(&response).close_behavior(PopupCloseBehavior::CloseOnClickOutside).show(|ui| {
+        ui.spacing_mut().item_spacing.y = 0.0;
+        rows.iter().for_each(|row| line(cx, ui, source, row));
     });
 }
 
@@ -123,6 +99,9 @@ fn rows(cx: &Cx<'_>, memory: &Memory, source: ImprintSource) -> Vec<Row> {
         for (layer, _) in build::models(cx, source) {
             add(layer, model_name(cx, source, layer));
         }
+    }
+    if let Some((color, about)) = steps::legend(cx, memory, source) {
+        rows.push(Row { layer: None, color, text: about.to_owned() });
     }
     if state.workbench.layer == Layer::Reasons
         && memory.layer_colors[source as usize].is_some()

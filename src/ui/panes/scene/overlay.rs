@@ -25,7 +25,7 @@ use touch2touch_pipeline::steps::pose::PoseResult;
 pub(super) fn show(
     cx: &mut Cx<'_>,
     ui: &mut Ui,
-    memory: &mut Memory,
+    memory: &Memory,
     source: ImprintSource,
     output: &SceneOutput,
     first: bool,

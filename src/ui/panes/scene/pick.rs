@@ -33,7 +33,7 @@ pub(super) fn click(cx: &mut Cx<'_>, memory: &Memory, source: ImprintSource, out
 }
 
 /// Everything known about the point that was clicked.
-pub(super) fn card(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: Rect, clouds: &Clouds) {
+pub(super) fn card(cx: &Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: Rect, clouds: &Clouds) {
     let Some(picked) = cx.state.workbench.picked.filter(|p| p.source == source) else { return };
     let state = cx.state;
     let Some(cloud) = clouds.finger(picked.finger) else { return };
@@ -61,18 +61,7 @@ pub(super) fn card(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: Re
         let inner = place.shrink2(vec2(8.0, 5.0));
         ui.scope_builder(UiBuilder::new().max_rect(inner), |ui| {
             ui.spacing_mut().item_spacing.y = 0.0;
-            ui.horizontal(|ui| {
-                ui.label(caption("Point", cx.p));
-                ui.with_layout(eframe::egui::Layout::right_to_left(eframe::egui::Align::Center), |ui| {
-                    let close = ui.add(eframe::egui::Button::new("×").frame(false).min_size(vec2(14.0, 14.0)));
-                    let close = close
-                        .accessible_name("Close the read-out")
-                        .on_hover_text(with_keys("Closes it ([[cancel_jobs]])"));
-                    if close.clicked() {
-                        cx.push(Command::Workbench(WorkbenchCommand::Pick(None)));
-                    }
-                });
-            });
+            ui.label(caption(with_keys("Point ([[cancel_jobs]] closes)"), cx.p));
             let line = Line { height: 15.0, size: SMALL, column: 0.0, swatch: None };
             for (name, value) in lines {
                 line.show(ui, (name, cx.p.weak), &[(value, cx.p.strong)]);

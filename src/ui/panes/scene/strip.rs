@@ -94,14 +94,7 @@ fn shown(cx: &mut Cx<'_>, ui: &mut Ui) {
         ui.set_min_width(210.0);
         ui.label(caption("Color the contact points by", cx.p));
         for layer in Layer::iter() {
-            let text = match layer {
-                Layer::None => "one color",
-                Layer::Residuals => "residuals, mm",
-                Layer::Reasons => "pixels used and left out",
-                Layer::Distance => "signed distance, mm",
-                Layer::Correspondences => "pull lines to the model",
-            };
-            if ui.radio(layer == painted, text).on_hover_text(layer.tooltip()).clicked() {
+            if ui.radio(layer == painted, layer.name()).on_hover_text(layer.tooltip()).clicked() {
                 cx.push(Command::Workbench(WorkbenchCommand::SetLayer(layer)));
             }
         }

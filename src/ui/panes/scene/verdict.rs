@@ -2,7 +2,7 @@
 
 use crate::app::results;
 use crate::app::settings::prefer;
-use eframe::egui::{Align, Button, Color32, FontId, Layout, RichText, Sense, Ui, UiBuilder, vec2};
+use eframe::egui::{Align, Button, Color32, Layout, RichText, Sense, Ui, UiBuilder, vec2};
 
 use super::hands;
 use super::overlay::{difference, lower_first, pose_details, pose_time, step_text};
@@ -37,7 +37,7 @@ fn lacks_contact(state: &State, source: ImprintSource) -> bool {
 
 /// The line; takes its height from the top of the pane. What mends both sides is offered on the `first`.
 pub(super) fn line(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, first: bool) {
-    let (text, color, mut details) = said(cx, source);
+    let (text, color, details) = said(cx, source);
     let width = ui.available_width();
     let (rect, response) = ui.allocate_exact_size(vec2(width, HEIGHT), Sense::hover());
     ui.painter().rect_filled(rect, 0.0, cx.p.frame);
@@ -79,33 +79,14 @@ pub(super) fn line(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, first: b
     }
     ui.scope_builder(UiBuilder::new().max_rect(inner), |ui| {
         ui.set_clip_rect(inner.intersect(ui.clip_rect()));
-        let shown = fitting(ui, &text);
-        if shown != text {
-            details.insert(0, text);
-        }
-        ui.add(eframe::egui::Label::new(RichText::new(shown).size(LINE).color(color)).truncate());
+        ui.add(eframe::egui::Label::new(RichText::new(&text).size(LINE).color(color)).truncate());
     });
-    if !details.is_empty() {
-        response.on_hover_ui(|ui| {
-            for line in details {
-                ui.label(RichText::new(line).size(SMALL));
-            }
-        });
-    }
-}
-
-/// The parts of the line that fit beside each other, from the first on: a whole part less is better than half a word.
-fn fitting(ui: &Ui, text: &str) -> String {
-    let width = |text: &str| {
-        let galley = ui.painter().layout_no_wrap(text.to_owned(), FontId::proportional(LINE), Color32::WHITE);
-        galley.size().x
-    };
-    let mut text = text;
-    while width(text) > ui.available_width() {
-        let Some((kept, _)) = text.rsplit_once(" · ") else { break };
-        text = kept;
-    }
-    text.to_owned()
+    response.on_hover_ui(|ui| {
+        // What is cut off stands there whole.
+        for line in std::iter::once(text).chain(details) {
+            ui.label(RichText::new(line).size(SMALL));
+        }
+    });
 }
 
 /// The line, its color, and what there is besides.

@@ -17,9 +17,8 @@ pub(crate) const IMAGE: &[(&str, &str)] = &[
 pub(crate) const COMPARE: &[(&str, &str)] = &[
     ("Click on A or B", "choose what to compare"),
     ("[[swap_compared]]", "swap A and B"),
-    ("[[compare_mode]]", "side by side, wipe, difference"),
+    ("[[compare_mode]]", "side by side, difference"),
     ("Hold F", "show B instead of A"),
-    ("Drag the line", "wipe"),
     ("Hover", "both values and their difference, in the status bar"),
     ("Wheel, drag, double-click", "zoom, move, fit"),
 ];
