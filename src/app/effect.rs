@@ -6,8 +6,8 @@ use std::sync::Arc;
 use super::jobs::Lane;
 use super::keys::{DatasetSeq, Revision};
 use super::results::preview::Onlooker;
-use super::services::SharedServices;
-use super::source::DataSource;
+use super::services::Services;
+use super::source::Source;
 use super::state::State;
 use super::state::labels::PairLabels;
 use super::state::settings::Settings;
@@ -33,26 +33,20 @@ pub struct LabelsToSave {
 }
 
 /// Labels that could not be written.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub struct NotSaved {
     /// The data set they are of.
-    pub source: Arc<dyn DataSource>,
+    pub source: Arc<Source>,
     /// The labels that were to be written.
     pub save: LabelsToSave,
     /// Why not.
     pub err: TaskError,
 }
 
-impl std::fmt::Debug for NotSaved {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "NotSaved({}, {})", self.save.name, self.err)
-    }
-}
-
 /// The access of an errand to what it does not hold itself.
 pub struct Access {
     /// Files and models.
-    pub services: SharedServices,
+    pub services: Arc<Services>,
     /// Who looks at pictures of predictions on the way.
     pub onlooker: Onlooker,
 }
@@ -141,15 +135,15 @@ pub enum Effect {
     /// Tell it to stop.
     Cancel(Ticket),
     /// Follow the folder of a data set, or none any more.
-    Follow(Option<(DatasetSeq, Arc<dyn DataSource>)>),
+    Follow(Option<(DatasetSeq, Arc<Source>)>),
     /// Look for bundles.
     FindBundles(Vec<PathBuf>),
     /// Write the labels of a pair; a newer request for the same pair replaces a waiting one.
-    SaveLabels(Arc<dyn DataSource>, Box<LabelsToSave>),
+    SaveLabels(Arc<Source>, Box<LabelsToSave>),
     /// Write labels that could not be written where they belong to another folder.
     KeepLabels {
         /// The data.
-        source: Arc<dyn DataSource>,
+        source: Arc<Source>,
         /// The labels to be written.
         unsaved: Vec<Unsaved>,
         /// The folder; `None` = where they wait for the next opening.
@@ -167,7 +161,7 @@ pub enum Effect {
 
 impl Effect {
     /// Has labels wait for the next opening of their data set.
-    pub(super) fn keep_waiting(source: Arc<dyn DataSource>, unsaved: Vec<Unsaved>) -> Self {
+    pub(super) fn keep_waiting(source: Arc<Source>, unsaved: Vec<Unsaved>) -> Self {
         Self::KeepLabels { source, unsaved, folder: None, revisions: Vec::new() }
     }
 }

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use super::effect::{Access, Effect, Errand};
 use super::jobs::Lane;
-use super::source::DataSource;
+use super::source::Source;
 use super::state::State;
 use super::state::library::Sort;
 use super::state::tasks::{Level, TaskKind};
@@ -79,13 +79,13 @@ fn rank(state: &mut State, effects: &mut Vec<Effect>) {
 fn start(state: &mut State, setup: Option<Setup>, what: &str, effects: &mut Vec<Effect>) {
     let (Some(setup), Some(open)) = (setup, &state.library.open) else { return };
     let source = open.source.clone();
-    let title = format!("{what} {}", source.title());
+    let title = format!("{what} {}", source.dataset.title);
     tasks::start(state, title, Score { source, setup }, effects);
 }
 
 /// Scores a data set.
 pub struct Score {
-    source: Arc<dyn DataSource>,
+    source: Arc<Source>,
     setup: Setup,
 }
 
@@ -94,8 +94,7 @@ impl Errand for Score {
     const KIND: TaskKind = TaskKind::Evaluate;
 
     fn run(self, access: &Access, cx: &JobCx) -> Result<Self::End, TaskError> {
-        let dataset = self.source.on_disk(Self::KIND.name())?;
-        evaluate::evaluate(dataset, &self.setup, access.services.models(), cx).map(Arc::new)
+        evaluate::evaluate(&self.source.dataset, &self.setup, &access.services.models, cx).map(Arc::new)
     }
 
     fn ended(evaluation: &Self::End, state: &mut State, _: &mut Vec<Effect>) {
@@ -112,7 +111,7 @@ impl Errand for Score {
             state.table.result = Some(evaluation.clone());
         }
         if let Some(open) = &state.library.open {
-            state.table.take(evaluation, open.source.index());
+            state.table.take(evaluation, &open.source.dataset.index);
             state.reorder();
         }
     }

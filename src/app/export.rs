@@ -21,7 +21,8 @@ use super::state::view::UiRequest;
 use super::tasks::{self, Write};
 use crate::spatial;
 use touch2touch_pipeline::error::TaskError;
-use touch2touch_pipeline::export::ExportChoice;
+use touch2touch_pipeline::export::{DrawnMasks, ExportChoice, ExportSetup, export_masks};
+use touch2touch_pipeline::labels::Labels;
 use touch2touch_pipeline::still::still;
 
 /// A command to what is taken away.
@@ -80,7 +81,10 @@ fn write(state: &mut State, output: Output, file: PathBuf, effects: &mut Vec<Eff
             state.export.asking_masks = false;
             let (labels, choice) = (state.document.finished_labels(), state.export.masks);
             let write = Write::new(Lane::Compute, "Export masks", file, move |folder, _, cx| {
-                Ok((source.export_masks(&labels, choice, &folder, cx)?, folder))
+                let setup = ExportSetup { pairs: None, choice };
+                let masks = DrawnMasks { labels: &Labels::of(&source.dataset), changed: &labels };
+                let (plan, _) = export_masks(&source.dataset, &masks, &setup, &folder, None, cx)?;
+                Ok((format!("Exported to {}: {}", folder.display(), plan.lines().join("; ")), folder))
             });
             tasks::start(state, "Export masks", write, effects);
         }
@@ -104,8 +108,7 @@ fn write(state: &mut State, output: Output, file: PathBuf, effects: &mut Vec<Eff
             let file = if png { file.with_extension("png") } else { file };
             let write = Write::new(Lane::Models, "Still", file, move |file, access, cx| {
                 let drawer = spatial::stills()?;
-                let dataset = source.on_disk("Still")?;
-                let done = still(dataset, &setup, access.services.models(), drawer, &file, cx)?;
+                let done = still(&source.dataset, &setup, &access.services.models, drawer, &file, cx)?;
                 let ([width, height], count) = (done.size_px, done.files.len());
                 let frames = if count == 1 { String::new() } else { format!("{count} frames of ") };
                 Ok((format!("Saved {} ({frames}{width} x {height} pixels)", file.display()), file))

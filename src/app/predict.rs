@@ -9,7 +9,7 @@ use std::sync::Arc;
 use super::effect::{Access, Effect, Errand};
 use super::keys::{Keyed, PredictionKey};
 use super::results::prediction;
-use super::source::DataSource;
+use super::source::Source;
 use super::state::tasks::TaskKind;
 use super::state::{Absent, State};
 use super::{recipe, results, settings, tasks};
@@ -106,7 +106,7 @@ fn start(state: &mut State, fingers: &[PadId], effects: &mut Vec<Effect>) {
 pub struct Generate {
     recipes: Vec<PredictionKey>,
     bundle: BundleInfo,
-    source: Arc<dyn DataSource>,
+    source: Arc<Source>,
     /// The pair, if it is loaded.
     sample: Option<Arc<Sample>>,
 }
@@ -122,7 +122,7 @@ impl Errand for Generate {
     fn run(self, access: &Access, cx: &JobCx) -> Result<Keyed, TaskError> {
         let Self { recipes, bundle, source, sample } = self;
         let onlooker = Some(access.onlooker.clone());
-        prediction::generate(&*access.services, recipes, &bundle, &*source, sample, cx, onlooker)
+        prediction::generate(&access.services, recipes, &bundle, &source, sample, cx, onlooker)
     }
 
     fn ended(made: &Keyed, state: &mut State, _: &mut Vec<Effect>) {

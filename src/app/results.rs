@@ -6,7 +6,7 @@
 use std::sync::Arc;
 
 use super::jobs::Job;
-use super::services::SharedServices;
+use super::services::Services;
 use super::state::State;
 use super::state::results::{Cached, Computed, Key, Request, table};
 use touch2touch_pipeline::error::TaskError;
@@ -72,7 +72,7 @@ pub(crate) use versus::{pose_absent, subject_points, want_comparison, want_versu
 /// A key that says how its result is computed.
 pub(crate) trait Computes: Key {
     /// The job, with its inputs gathered; `None` if one is not there (any more).
-    fn job(&self, state: &State, services: &SharedServices) -> Option<Job<Self::Value>>;
+    fn job(&self, state: &State, services: &Arc<Services>) -> Option<Job<Self::Value>>;
 
     /// Asks for it where a pane on screen needs it and nothing else asks.
     fn wanted(_wants: &mut Demands<'_>) {}
@@ -97,7 +97,7 @@ macro_rules! computing {
         }
 
         /// The job of a request; `None` if an input is not there (any more).
-        pub(super) fn job(request: &Request, state: &State, services: &SharedServices) -> Option<Job<Computed>> {
+        pub(super) fn job(request: &Request, state: &State, services: &Arc<Services>) -> Option<Job<Computed>> {
             match request { $( Request::$variant(key) => {
                 let done = key.clone();
                 Some(key.job(state, services)?.map(move |value| Computed::$variant(done, Arc::new(value))))

@@ -18,7 +18,7 @@ use super::effect::Effect;
 use super::jobs::Lane;
 use super::keys::{DatasetSeq, Preview, TouchKey};
 use super::results::preview::PreviewRequest;
-use super::services::SharedServices;
+use super::services::Services;
 use super::state::State;
 use super::state::library::Place;
 use super::state::results::Request;
@@ -58,7 +58,7 @@ pub(super) enum JobId {
 
 /// Runs what `apply` wants done and what the panes want to show.
 pub struct Runtime {
-    services: SharedServices,
+    services: Arc<Services>,
     lanes: Lanes,
     events: Receiver<Event>,
     sender: Sender<Event>,
@@ -80,16 +80,16 @@ pub struct Runtime {
 
 impl Runtime {
     /// A runtime with its own threads; `wake` is called when there is news.
-    pub fn threads(services: SharedServices, wake: Wake) -> Self {
+    pub fn threads(services: Arc<Services>, wake: Wake) -> Self {
         Self::new(services, wake, true)
     }
 
     /// A runtime without threads: jobs wait until [`Runtime::run_one`] or [`Runtime::settle`] runs them here.
-    pub fn inline(services: SharedServices) -> Self {
+    pub fn inline(services: Arc<Services>) -> Self {
         Self::new(services, Arc::new(|| {}), false)
     }
 
-    fn new(services: SharedServices, wake: Wake, threaded: bool) -> Self {
+    fn new(services: Arc<Services>, wake: Wake, threaded: bool) -> Self {
         let (sender, events) = channel();
         let lanes = Lanes::new(threaded, &sender, &wake);
         Self {
@@ -173,7 +173,7 @@ impl Runtime {
             self.run(state, LabelsCommand::Unsaved(UnsavedCommand::Retry), ui);
         }
         if due || self.retry_at.is_none() {
-            self.retry_at = now.checked_add(self.services.retry_after());
+            self.retry_at = now.checked_add(self.services.retry_after);
         }
     }
 

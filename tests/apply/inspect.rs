@@ -11,14 +11,14 @@ use touch2touch::app::{demand, results};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::frames::PlanarPose;
 
-use super::double::{Bench, SIMULATED};
+use super::bench::{Bench, SIMULATED};
 use super::panes;
 
 const MEASURED: ImprintSource = ImprintSource::Measured;
 
 /// The simulated grasp with the true contact as its mask.
 fn bench(list: &[Pane]) -> Bench {
-    let mut bench = Bench::open_simulated();
+    let mut bench = Bench::open();
     bench.send(prefer(|s| s.mask.choice.source = MaskSource::Truth));
     bench.send(LibraryCommand::Select(SIMULATED));
     bench.send(panes(list));
@@ -132,5 +132,5 @@ fn a_start_is_a_run_of_its_own_and_the_pair_resets_it() {
     bench.send(LibraryCommand::Select(PairId(0)));
     bench.settle();
     assert_eq!(bench.state.inspect.start, None);
-    assert!(results::inspected(&bench.state).is_none(), "this pair has no camera");
+    assert!(results::inspected(&bench.state).is_none(), "the true contact of this pair is not known");
 }

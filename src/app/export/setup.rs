@@ -111,6 +111,5 @@ pub fn pair_export(state: &State, source: ImprintSource) -> Option<PairExport> {
 
 /// True where the selected pair can be drawn in 3D.
 pub(crate) fn can_draw(state: &State) -> bool {
-    let open = state.library.open.as_ref();
-    open.is_some_and(|open| open.source.as_dataset().is_some()) && state.entry().is_some()
+    state.entry().is_some()
 }

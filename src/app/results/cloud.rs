@@ -6,7 +6,7 @@ use super::super::jobs::{Job, Lane};
 use super::super::keys::{CloudKey, ImprintKey, ImprintSource, MaskKey, MaskVersion};
 use super::super::results;
 use super::super::results::{Computes, Demands};
-use super::super::services::SharedServices;
+use super::super::services::Services;
 use super::super::state::results::Latest;
 use super::super::state::{Absent, Lookup, State};
 use touch2touch_core::rig::{PadId, PerPad};
@@ -14,7 +14,7 @@ use touch2touch_pipeline::steps::cloud::Clouds;
 use touch2touch_pipeline::steps::estimate::Estimate;
 
 impl Computes for CloudKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Estimate>> {
+    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Estimate>> {
         let (mut imprints, mut masks) = (PerPad::default(), PerPad::default());
         let mut made_by = None;
         for (finger, (imprint, version)) in self.parts.entries() {

@@ -1,10 +1,12 @@
 //! Imprints: those measured lie in the sample, those predicted are made of a raw prediction.
 
+use std::sync::Arc;
+
 use super::super::jobs::{Job, Lane};
 use super::super::keys::{ColorKey, FlagsKey, ImprintSource, MetersKey, PictureKey, TouchKey};
 use super::super::pane::Demand;
 use super::super::results::{self, Computes, Demands, gone};
-use super::super::services::SharedServices;
+use super::super::services::Services;
 use super::super::state::{Absent, Lookup, State};
 use touch2touch_core::grid::{DepthMap, RgbGrid};
 use touch2touch_core::postprocess::Flag;
@@ -14,7 +16,7 @@ use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::steps::imprint::{self, flags_of};
 
 impl Computes for MetersKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<DepthMap>> {
+    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<DepthMap>> {
         let Self(recipe, shift) = self;
         let prediction = state.results.predictions.get(recipe)?.clone();
         let sample = state.results.samples.get(&recipe.touch.pair)?.clone();
@@ -26,7 +28,7 @@ impl Computes for MetersKey {
 }
 
 impl Computes for ColorKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<RgbGrid>> {
+    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<RgbGrid>> {
         let prediction = state.results.predictions.get(&self.0)?.clone();
         Some(Job::new(Lane::Compute, "Predicted color picture", move |_| {
             imprint::color(&prediction, [0, 0])?.ok_or_else(gone)
@@ -35,13 +37,12 @@ impl Computes for ColorKey {
 }
 
 impl Computes for PictureKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Beside>> {
+    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Beside>> {
         let pair = self.0.pair;
         let source = state.library.open.as_ref()?.source.clone();
         let sample = state.results.samples.get(&pair)?.clone();
         Some(Job::new(Lane::Files, "Stored picture", move |_| {
-            let dataset = source.as_dataset().ok_or_else(gone)?;
-            beside(dataset, pair.pair, &sample)?.ok_or_else(|| {
+            beside(&source.dataset, pair.pair, &sample)?.ok_or_else(|| {
                 let why = "no picture of another program's prediction lies beside this pair";
                 TaskError::new("Stored picture", why)
                     .with_hint("It is read from NAME_vqvae.png beside NAME_bubble.png.")
@@ -85,7 +86,7 @@ pub(crate) fn want_imprint(wants: &mut Demands<'_>, finger: PadId, touch: TouchK
 }
 
 impl Computes for FlagsKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Vec<Flag>>> {
+    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Vec<Flag>>> {
         let Self(recipe, shift) = self.clone();
         let prediction = state.results.predictions.get(&recipe)?.clone();
         let sample = state.results.samples.get(&recipe.touch.pair)?.clone();

@@ -7,7 +7,7 @@ use strum::IntoEnumIterator as _;
 use super::super::jobs::{Job, Lane};
 use super::super::keys::{ImprintKey, ImprintSource, MaskKey, MaskRecipe, MaskVersion, ToolKey};
 use super::super::results::{Computes, Demands, gone};
-use super::super::services::SharedServices;
+use super::super::services::Services;
 use super::super::state::results::Request;
 use super::super::state::tasks::Level;
 use super::super::state::{Absent, Lookup, State};
@@ -34,7 +34,7 @@ pub(crate) fn mask_of(state: &State, version: &MaskVersion, imprint: &ImprintKey
 }
 
 impl Computes for MaskKey {
-    fn job(&self, state: &State, services: &SharedServices) -> Option<Job<ContactMask>> {
+    fn job(&self, state: &State, services: &Arc<Services>) -> Option<Job<ContactMask>> {
         let imprint = results::imprint_of(state, &self.imprint).ready()?.clone();
         let touch = self.imprint.touch();
         let sample = state.results.samples.get(&touch.pair)?.clone();
@@ -53,7 +53,7 @@ impl Computes for MaskKey {
             let inputs = MaskInputs { sample: &sample, tool, labels: None, of: None };
             let by_model = |imprint: &DepthMap| {
                 let bundle = model.as_ref().ok_or_else(gone)?;
-                services.mask_by_model(bundle, engine, imprint, recipe.probability())
+                services.models.mask(bundle, engine, imprint, recipe.probability())
             };
             contact_mask(&recipe, &imprint, touch.finger, inputs, by_model)
         }))

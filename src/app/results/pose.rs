@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::super::jobs::{Job, Lane};
 use super::super::keys::{ImprintSource, PoseKey, ProvisionalPoseKey, ToolKey};
 use super::super::results::{Computes, Demands};
-use super::super::services::SharedServices;
+use super::super::services::Services;
 use super::super::state::results::Computed;
 use super::super::state::{Absent, Lookup, State};
 use super::super::{recipe, results};
@@ -52,7 +52,7 @@ pub(crate) fn registered(state: &State, key: &PoseKey) -> Option<Registered> {
 }
 
 impl Computes for PoseKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<PoseResult>> {
+    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<PoseResult>> {
         registering(state, self, Ask { evidence: true, ..Ask::default() })
     }
 
@@ -64,7 +64,7 @@ impl Computes for PoseKey {
 }
 
 impl Computes for ProvisionalPoseKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<PoseResult>> {
+    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<PoseResult>> {
         registering(state, &self.0, Ask { provisional: true, evidence: true, ..Ask::default() })
     }
 

@@ -11,8 +11,8 @@ use super::super::pane::Demand;
 use super::super::recipe;
 use super::super::results::preview::Onlooker;
 use super::super::results::{self, Computes, Demands};
-use super::super::services::{Services, SharedServices};
-use super::super::source::DataSource;
+use super::super::services::Services;
+use super::super::source::Source;
 use super::super::state::results::Key as _;
 use super::super::state::{Absent, State};
 use touch2touch_core::grid::RgbGrid;
@@ -21,17 +21,17 @@ use touch2touch_core::sample::Sample;
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::job::JobCx;
 use touch2touch_pipeline::steps::bundles::{BundleInfo, BundleKind};
-use touch2touch_pipeline::steps::models;
+use touch2touch_pipeline::steps::models::{self, KeptPrediction};
 use touch2touch_pipeline::steps::prediction::Prediction;
 
 impl Computes for PredictionKey {
-    fn job(&self, state: &State, services: &SharedServices) -> Option<Job<Prediction>> {
+    fn job(&self, state: &State, services: &Arc<Services>) -> Option<Job<Prediction>> {
         let (services, recipe) = (services.clone(), self.clone());
         let source = state.library.open.as_ref()?.source.clone();
         let bundle = state.library.bundle(&recipe.bundle)?.clone();
         let sample = state.results.samples.get(&recipe.touch.pair).cloned();
         Some(Job::new(Lane::Models, format!("Generate with {}", bundle.name), move |cx| {
-            let made = generate(&*services, vec![recipe], &bundle, &*source, sample, cx, None)?.pop();
+            let made = generate(&services, vec![recipe], &bundle, &source, sample, cx, None)?.pop();
             made.map(|(_, made)| Arc::unwrap_or_clone(made)).ok_or_else(|| TaskError::new("Generate", "no answer"))
         }))
     }
@@ -42,7 +42,7 @@ impl Computes for PredictionKey {
 }
 
 impl Computes for StoredKey {
-    fn job(&self, state: &State, services: &SharedServices) -> Option<Job<Keyed>> {
+    fn job(&self, state: &State, services: &Arc<Services>) -> Option<Job<Keyed>> {
         let (services, touch) = (services.clone(), self.0);
         let bundles = state.library.bundles.clone();
         let runtime = state.settings.runtime;
@@ -52,8 +52,13 @@ impl Computes for StoredKey {
         let inputs: BTreeSet<SensorId> = starts.collect();
         Some(Job::new(Lane::Files, "Look for earlier predictions", move |_| {
             let pictures = inputs.iter().filter_map(|input| sample.pad(touch.finger)?.picture(*input));
-            let found = pictures.flat_map(|picture| services.stored(&bundles, runtime, touch, &picture));
-            Ok(found.map(|(key, made)| (key, Arc::new(made))).collect())
+            let kept = pictures.flat_map(|picture| services.models.kept(&bundles, runtime, &picture));
+            let keyed = |kept: KeptPrediction| {
+                let bundle = kept.prediction.bundle.clone();
+                let key = PredictionKey { touch, bundle, config: kept.config, runtime: kept.engine };
+                (key, Arc::new(kept.prediction))
+            };
+            Ok(kept.map(keyed).collect())
         }))
     }
 
@@ -75,17 +80,17 @@ impl Computes for StoredKey {
 /// # Errors
 /// If no finger has a GelSlim image, the pair or the model cannot be loaded or run, or the job was told to stop.
 pub(crate) fn generate(
-    services: &dyn Services,
+    services: &Services,
     recipes: Vec<PredictionKey>,
     bundle: &BundleInfo,
-    source: &dyn DataSource,
+    source: &Source,
     sample: Option<Arc<Sample>>,
     cx: &JobCx,
     onlooker: Option<Onlooker>,
 ) -> Result<Keyed, TaskError> {
     let Some(first) = recipes.first() else { return Ok(Vec::new()) };
-    let rig = source.rig();
-    let ends = bundle.ends(&rig).transpose().map_err(|err| TaskError::from_error("Generate", &err))?;
+    let rig = &source.dataset.rig;
+    let ends = bundle.ends(rig).transpose().map_err(|err| TaskError::from_error("Generate", &err))?;
     let input = ends.ok_or_else(|| TaskError::new("Generate", "the bundle is not a generator"))?.input;
     let sensor = rig.sensor(input).map_or("input", |sensor| &*sensor.name).to_owned();
     let fingers: Vec<_> = recipes.iter().map(|recipe| rig.pad_key(recipe.touch.finger)).collect();
@@ -119,7 +124,7 @@ pub(crate) fn generate(
         Some(onlooker) => cx.clone().with_previews(onlooker.of(keys.clone())),
         None => cx.clone(),
     };
-    let made = services.predict(bundle, engine, &config, &wanted, &cx)?;
+    let made = services.models.predict(bundle, engine, &config, &wanted, &cx)?;
     Ok(keys.into_iter().zip(made.into_iter().map(Arc::new)).collect())
 }
 
@@ -189,12 +194,12 @@ pub(crate) const CHEAP_S: f64 = 1.0;
 const LOOK: Duration = Duration::from_millis(10);
 
 impl Computes for PrefetchKey {
-    fn job(&self, state: &State, services: &SharedServices) -> Option<Job<Prediction>> {
+    fn job(&self, state: &State, services: &Arc<Services>) -> Option<Job<Prediction>> {
         let Job { lane, what, body } = self.0.job(state, services)?;
         // Once for a pair and settings: the other finger follows at once.
         let beside = |pad| PredictionKey { touch: self.0.touch.pair.finger(pad), ..self.0.clone() };
         let first = !state.rig().pads().any(|pad| state.results.predictions.contains(&beside(pad)));
-        let patience = if first { services.patience() } else { Duration::ZERO };
+        let patience = if first { services.patience } else { Duration::ZERO };
         let told = what.clone();
         Some(Job::new(lane, what, move |cx| {
             // Who pages on does not want it.

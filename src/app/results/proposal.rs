@@ -8,7 +8,7 @@ use super::super::keys::{
 };
 use super::super::results;
 use super::super::results::{Computes, Demands};
-use super::super::services::SharedServices;
+use super::super::services::Services;
 use super::super::state::{Absent, Lookup, State};
 use touch2touch_core::bits::Bits;
 use touch2touch_core::frames::PlanarPose;
@@ -37,7 +37,7 @@ fn cad_pose(state: &State, place: &CadPlace, pair: PairKey) -> Option<(CadPose, 
 }
 
 impl Computes for DistancesKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Distances>> {
+    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Distances>> {
         let (imprint, touch) = (results::imprint_of(state, &self.imprint).ready()?.clone(), self.imprint.touch());
         let (at, pose) = cad_pose(state, &self.at, touch.pair)?;
         let (sample, side) = (state.results.samples.get(&touch.pair)?.clone(), self.imprint.side());
@@ -53,7 +53,7 @@ impl Computes for DistancesKey {
 }
 
 impl Computes for ProposalKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Proposal>> {
+    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Proposal>> {
         let imprint = results::imprint_of(state, &self.imprint).ready()?.clone();
         let job = |make: Box<dyn FnOnce() -> Result<Proposal, TaskError> + Send>| {
             Some(Job::new(Lane::Compute, WHAT, move |_| make()))

@@ -10,7 +10,7 @@ use super::super::keys::{
 };
 use super::super::results;
 use super::super::results::{Computes, Demands};
-use super::super::services::SharedServices;
+use super::super::services::Services;
 use super::super::state::inspect::Inspected;
 use super::super::state::{Absent, Lookup, State};
 use touch2touch_core::align::Ask;
@@ -19,10 +19,10 @@ use touch2touch_pipeline::compare::deviation::{self, Deviation};
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::steps::layers::{self, LayerResult};
 use touch2touch_pipeline::steps::pose::PoseResult;
-use touch2touch_pipeline::steps::tool::{NamedTool, named_tool};
+use touch2touch_pipeline::steps::tool::{NamedTool, named_tool, tool_file};
 
 impl Computes for RunKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<PoseResult>> {
+    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<PoseResult>> {
         let registered = results::registered(state, &self.pose)?;
         let (registration, start) = (self.pose.registration, self.start.map(PoseBits::get));
         Some(Job::new(Lane::Compute, "Registration, recorded", move |_| {
@@ -38,7 +38,7 @@ pub(crate) fn run_key(state: &State, source: ImprintSource) -> Option<RunKey> {
 }
 
 impl Computes for InspectionKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Inspection>> {
+    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Inspection>> {
         let (registered, by) = (results::registered(state, &self.0.pose)?, self.0.pose.registration);
         let run = state.results.runs.get(&self.0)?.clone();
         Some(Job::new(Lane::Compute, "Steps of the registration", move |_| {
@@ -103,7 +103,7 @@ pub(crate) fn inspected_in(state: &State, source: ImprintSource) -> Option<Inspe
 }
 
 impl Computes for LayersKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<LayerResult>> {
+    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<LayerResult>> {
         let estimate = state.results.clouds.get(&self.0.cloud)?.clone();
         let run = state.results.runs.get(&self.run())?.clone();
         Some(Job::new(Lane::Compute, "Layers of the registration", move |_| layers::layers(&estimate, &run)))
@@ -129,7 +129,7 @@ pub(crate) fn want_layers(wants: &mut Demands<'_>, source: ImprintSource) {
 }
 
 impl Computes for DeviationKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Deviation>> {
+    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Deviation>> {
         let registered = results::registered(state, &self.0)?;
         let pose = state.results.poses.get(&self.0)?.grasp_from_object;
         Some(Job::new(Lane::Compute, "Distances to the model", move |_| {
@@ -154,7 +154,7 @@ pub(crate) fn want_deviation(wants: &mut Demands<'_>, source: ImprintSource) {
 }
 
 impl Computes for RankingKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Vec<Candidate>>> {
+    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Vec<Candidate>>> {
         let open = state.library.open.as_ref()?;
         let (source, registered, registration) =
             (open.source.clone(), results::registered(state, &self.0)?, self.0.registration);
@@ -170,7 +170,7 @@ impl Computes for RankingKey {
                     return Err(TaskError::cancelled("Which tool"));
                 }
                 // A model that cannot be used is no candidate.
-                let read = || Some(Arc::new(named_tool(&name, source.tool_mesh(&name).ok()?).ok()?));
+                let read = || Some(Arc::new(named_tool(&name, tool_file(&source.dataset, &name).ok()?.mesh).ok()?));
                 models.extend(known.or_else(read));
             }
             let tools = models.iter().map(|tool| (tool.name.as_str(), &tool.model));

@@ -10,7 +10,7 @@ use super::super::keys::{
 };
 use super::super::pane::Demand;
 use super::super::results::{Computes, Demands};
-use super::super::services::SharedServices;
+use super::super::services::Services;
 use super::super::state::settings::versus::{Versus, VersusMode};
 use super::super::state::{Absent, Lookup, State};
 use super::super::{recipe, results};
@@ -27,7 +27,7 @@ use touch2touch_pipeline::steps::pose::PoseResult;
 use touch2touch_pipeline::steps::prediction::Prediction;
 
 impl Computes for MeanKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<DepthMap>> {
+    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<DepthMap>> {
         let meters =
             |recipe: &PredictionKey| state.results.imprints.get(&MetersKey(recipe.clone(), self.shift)).cloned();
         let imprints: Vec<Arc<DepthMap>> = self.recipes.iter().map(meters).collect::<Option<_>>()?;
@@ -38,7 +38,7 @@ impl Computes for MeanKey {
 }
 
 impl Computes for ComparedKey {
-    fn job(&self, state: &State, services: &SharedServices) -> Option<Job<Prediction>> {
+    fn job(&self, state: &State, services: &Arc<Services>) -> Option<Job<Prediction>> {
         self.0.job(state, services)
     }
 
@@ -89,7 +89,7 @@ impl Part {
 }
 
 impl Computes for VersusKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Comparison>> {
+    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Comparison>> {
         let touch = self.a.touch();
         let parts = [Part::of(&self.a, state)?, Part::of(&self.b, state)?];
         let sample = state.results.samples.get(&touch.pair)?.clone();
@@ -99,10 +99,7 @@ impl Computes for VersusKey {
             _ => "Compare A and B",
         };
         Some(Job::new(Lane::Compute, what, move |_| {
-            let tile = match source.as_dataset() {
-                Some(dataset) => tile_of(dataset, touch.pair.pair, &sample)?,
-                None => None,
-            };
+            let tile = tile_of(&source.dataset, touch.pair.pair, &sample)?;
             let [a, b] = parts.each_ref().map(|part| part.depicted(&sample, touch.finger, tile.as_ref()));
             between(&a?, &b?, &sample, touch.finger)
         }))
@@ -110,7 +107,7 @@ impl Computes for VersusKey {
 }
 
 impl Computes for CloudDifferenceKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<CloudDifference>> {
+    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<CloudDifference>> {
         let cloud = |key: &CloudKey| state.results.clouds.get(key).cloned();
         let (a, b) = (cloud(&self.a)?, cloud(&self.b)?);
         Some(Job::new(Lane::Compute, "Distances between clouds", move |_| Ok(cloud_difference(&a, &b))))

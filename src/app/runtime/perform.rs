@@ -8,15 +8,17 @@ use super::super::effect::{Access, Effect, LabelsToSave, NotSaved, Started};
 use super::super::jobs::{Body, Lane};
 use super::super::keys::Preview;
 use super::super::results::preview::{Onlooker, PreviewSink};
-use super::super::source::DataSource;
+use super::super::source::Source;
 use super::super::state::labels::Merged;
 use super::super::state::tasks::Ticket;
 use super::super::state::view::UiRequest;
 use super::lanes::{Event, Job};
 use super::{JobId, Runtime, lock};
+use touch2touch_core::dataset::Problem;
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::io::folders;
 use touch2touch_pipeline::job::{Cancel, JobCx};
+use touch2touch_pipeline::steps::bundles;
 
 impl Runtime {
     pub(super) fn perform(&mut self, effect: Effect, ui: &mut Vec<UiRequest>) {
@@ -85,18 +87,21 @@ impl Runtime {
     }
 
     fn find_bundles(&self, folders: Vec<PathBuf>) {
-        let services = self.services.clone();
         // On the lane of the models: hashing them must not hold up the files.
         self.unwatched(Lane::Models, JobId::Bundles, "Look for model bundles", move |_| {
-            let (bundles, problems) = services.find_bundles(&folders);
-            Ok(Answer::Bundles(bundles, problems))
+            let found = bundles::find(&folders);
+            let refused = |p: Problem| {
+                let why = format!("{} ({})", p.what, p.file.display());
+                TaskError::new("A model bundle was refused", why).with_hint(p.hint)
+            };
+            Ok(Answer::Bundles(found.bundles, found.problems.into_iter().map(refused).collect()))
         });
     }
 
-    fn save_labels(&self, source: Arc<dyn DataSource>, save: LabelsToSave) {
+    fn save_labels(&self, source: Arc<Source>, save: LabelsToSave) {
         let not = NotSaved { source: source.clone(), save: save.clone(), err: TaskError::new("", "") };
         let body: Body<Answer> = Box::new(move |_| {
-            let now = source.save_labels(&save.name, &save.labels, &save.deed)?;
+            let now = source.labels.save(&save.name, &save.labels, &save.deed)?;
             let LabelsToSave { name, revision, labels: given, .. } = save;
             let merged = now.map(|now| Box::new(Merged { given, now }));
             Ok(Answer::LabelsSaved(name, revision, merged))

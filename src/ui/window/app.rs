@@ -26,7 +26,7 @@ use crate::app::keys::ImprintSource;
 use crate::app::library::Place;
 use crate::app::pane::{Kind, Workspace};
 use crate::app::runtime::Runtime;
-use crate::app::services::SharedServices;
+use crate::app::services::Services;
 use crate::app::settings::Last;
 use crate::app::settings::MaskTool;
 use crate::app::settings::Theme;
@@ -48,7 +48,7 @@ use touch2touch_pipeline::io::fonts;
 /// Options that the studio is started with.
 pub struct Options {
     /// Files and models.
-    pub services: SharedServices,
+    pub services: Arc<Services>,
     /// Path to open; `None` opens what was open last, else the demo.
     pub open: Option<PathBuf>,
     /// Jobs run between frames on the window's own thread, one per frame, instead of on lanes of their own: the same
@@ -68,7 +68,7 @@ pub struct Options {
 
 impl Options {
     /// The usual ones.
-    pub fn new(services: SharedServices, open: Option<PathBuf>) -> Self {
+    pub fn new(services: Arc<Services>, open: Option<PathBuf>) -> Self {
         Self {
             services,
             open,

@@ -25,12 +25,12 @@ use touch2touch::app::labels::{ImportMasks, PairLabels, Review, StrokeIn3d};
 use touch2touch::app::learn::{AdaptPairs, Learn, LearnForm, Learned, Network};
 use touch2touch::app::library::{Open, Place, ReadTool, Sort};
 use touch2touch::app::predict::{Generate, Refit};
-use touch2touch::app::services::{Followed, Services as _};
 use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{
     Change, ColorMap, ColorRange, GelView, GenerateSettings, Last, LayerLook, LayerSize, MaskChoice, MaskSettings,
     MaskSource, MaskTool, SceneLayer, SceneLook, Settings, SpacePane, Theme, Versus, VersusMode, Workspace,
 };
+use touch2touch::app::source::{Followed, Source};
 use touch2touch::app::state::results::{Computed, Request};
 use touch2touch::app::tasks::{TaskKind, Ticket, Write};
 use touch2touch::app::workbench::{Layer, Picked, SceneTool};
@@ -60,7 +60,7 @@ use touch2touch_pipeline::steps::tool::UnitSet;
 use touch2touch_pipeline::still::space::{Ground, ViewAngles};
 
 use super::super::answered::{adapted, trained};
-use super::super::double::Double;
+use super::super::bench::models;
 
 fn position() -> impl Strategy<Value = [f32; 2]> {
     prop_oneof![
@@ -149,7 +149,7 @@ fn planar() -> impl Strategy<Value = PlanarPose> {
 }
 
 fn place() -> impl Strategy<Value = Place> {
-    select(vec![Place::Demo, Place::Path("missing".into()), Place::Path("elsewhere".into())])
+    select(vec![Place::Path("missing".into()), Place::Path("elsewhere".into())])
 }
 
 fn shift() -> impl Strategy<Value = ShiftMode> {
@@ -167,15 +167,19 @@ fn unsaved() -> impl Strategy<Value = UnsavedCommand> {
         UnsavedCommand::Discard,
         UnsavedCommand::Retry,
         UnsavedCommand::AskFolder,
-        UnsavedCommand::Elsewhere("elsewhere".into()),
+        UnsavedCommand::Elsewhere("/dev/null/folder".into()),
     ])
+}
+
+fn demo() -> Arc<Source> {
+    Arc::new(Source::open(&Place::Demo, None).expect("it is built in"))
 }
 
 fn not_saved(seq: DatasetSeq) -> Box<NotSaved> {
     let (name, labels, deed) = ("tool_a/data_0".to_owned(), PairLabels::default(), Operation::default());
     let save = LabelsToSave { seq, name, revision: Revision(1), labels, deed };
     let err = TaskError::new("Save the labels", "no space left");
-    Box::new(NotSaved { source: Double::new(false, true).source, save, err })
+    Box::new(NotSaved { source: demo(), save, err })
 }
 
 fn ticket() -> impl Strategy<Value = Ticket> {
@@ -301,18 +305,19 @@ fn evaluation() -> Evaluation {
 const NEVER: DatasetSeq = DatasetSeq(u32::MAX);
 
 fn followed() -> Followed {
-    let source = Double::new(false, true).source;
-    Followed { source, pair: PairId(0), completed: false, sample: Err(TaskError::new("Load", "it is half written")) }
+    Followed {
+        source: demo(),
+        pair: PairId(0),
+        completed: false,
+        sample: Err(TaskError::new("Load", "it is half written")),
+    }
 }
 
 /// The end of an errand of any kind, as empty as it can be. A kind that has none does not compile.
 fn ended() -> impl Strategy<Value = Ended> {
     (any_of::<TaskKind>(), select(vec!["tool_a/data_0", "elsewhere"]), select(vec![DatasetSeq(1), NEVER])).prop_map(
         |(kind, name, seq)| match kind {
-            TaskKind::Open => {
-                let opened = Double::new(false, true).open(&Place::Demo).expect("the double opens");
-                Ended::of::<Open>((NEVER, Place::Path(name.into()), opened))
-            }
+            TaskKind::Open => Ended::of::<Open>((NEVER, Place::Path(name.into()), demo())),
             TaskKind::ReadTool => {
                 let (tool, word, file) = ("tool_a".into(), "mm".into(), "unit.txt".into());
                 let set = UnitSet { tool, unit: ToolUnit::Millimeters, file, word, not_written: None };
@@ -330,7 +335,7 @@ fn ended() -> impl Strategy<Value = Ended> {
             TaskKind::ReadOtherwise => Ended::of::<ReadOtherwise>((seq, "read-as.txt".into(), "swap-fingers".into())),
             TaskKind::Learn if seq.0 % 2 == 0 => Ended::of::<Learn>(Learned::Generator(Arc::new(adapted()), None)),
             TaskKind::Learn => {
-                let bundle = Double::new(false, true).find_bundles(&[]).0.remove(1);
+                let bundle = models().remove(1);
                 Ended::of::<Learn>(Learned::Masks(Arc::new(trained()), bundle))
             }
         },
@@ -477,7 +482,7 @@ draws! {
         1 Start,
         1 All,
         1 Rank,
-        1 Export(Just(PathBuf::from("table"))),
+        1 Export(Just(PathBuf::from("/dev/null/folder"))),
     }
     export: ExportCommand {
         1 AskMasks(any::<bool>()),
@@ -524,7 +529,7 @@ draws! {
     // Answers that nobody waits for, or that come too late.
     answers: Answer {
         1 Followed(Just(NEVER), Just(()).prop_map(|()| followed())),
-        1 Bundles(Just(()).prop_map(|()| Double::new(false, true).find_bundles(&[]).0), Just(Vec::new())),
+        1 Bundles(Just(()).prop_map(|()| models()), Just(Vec::new())),
         1 SettingsLoaded(mask().prop_map(|mask| Box::new(Settings { mask, ..Settings::default() })), Just(None)),
         1 Demanded(touch().prop_map(|touch| vec![Request::Sample(touch.pair)])),
         1 Computed(select(vec![DatasetSeq(1), NEVER]),
