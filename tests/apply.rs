@@ -83,14 +83,15 @@ fn what_is_not_on_screen_is_not_computed() {
     bench.settle();
     let loaded = bench.state.results.samples.len();
     assert_eq!(loaded, 5, "the pair shown and four neighbors on the one side that has any");
-    assert!(bench.state.results.masks.is_empty() && bench.state.results.clouds.is_empty());
+    assert!(bench.state.results.estimates.is_empty());
     bench.send(panes(&[Pane::Browser]));
     bench.send(LibraryCommand::ShowRows(0..3));
     bench.settle();
     assert_eq!(bench.state.results.thumbnails.len(), 3);
     bench.send(panes(&[Pane::Measured]));
     bench.settle();
-    assert_eq!(bench.state.results.masks.len(), 1, "only the active finger is on screen");
+    let masked = |finger| results::mask_in_force(&bench.state, ImprintSource::Measured, finger).is_ok();
+    assert!(masked(RIGHT) && !masked(lab::LEFT), "only the active finger is on screen");
     assert_eq!(bench.state.results.samples.len(), loaded, "thumbnails of loaded pairs need no file");
 }
 

@@ -17,6 +17,7 @@ use super::{follow, labels, library, results, settings, tasks, workbench};
 use touch2touch_pipeline::error::{TaskError, TaskErrorKind};
 use touch2touch_pipeline::job::Progress;
 use touch2touch_pipeline::steps::bundles::BundleInfo;
+use touch2touch_pipeline::steps::recipe::Stage;
 
 /// An answer of the runtime.
 #[derive(Clone, Debug)]
@@ -134,7 +135,7 @@ fn react(state: &mut State, request: &Request) {
             settings::follow_range(state);
             library::say_notes(state);
         }
-        Request::Cloud(_) => workbench::refresh_cost(state),
+        Request::Estimate(key) if key.stage >= Stage::Cloud => workbench::refresh_cost(state),
         Request::Run(key) => workbench::run_arrived(state, key),
         _ => {}
     }

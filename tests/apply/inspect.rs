@@ -38,11 +38,11 @@ fn nothing_is_recorded_unless_it_is_looked_at() {
     assert!(bench.state.results.inspections.is_empty());
     assert!(Action::StepBack.command(&bench.state).is_none(), "there is nothing to step through");
     // The time machine alone records; it needs no pose beside.
-    bench.state.results.poses.clear();
+    bench.state.results.estimates.clear();
     bench.send(panes(&[Pane::TimeMachine]));
     bench.settle();
     assert_eq!(bench.state.results.inspections.len(), 1);
-    assert!(bench.state.results.poses.is_empty());
+    assert!(results::pose(&bench.state, MEASURED).ready().is_none());
     let inspection = results::inspection(&bench.state).ready().unwrap().clone();
     assert_eq!(inspection.report().grasp_from_object, pose.grasp_from_object, "looking changes nothing");
     // A closed pane asks for nothing.

@@ -4,11 +4,10 @@ use std::sync::{Arc, Condvar, Mutex};
 
 use touch2touch::app::action::Action;
 use touch2touch::app::command::{Command, LabelsCommand, LibraryCommand, Pane, PredictCommand};
-use touch2touch::app::keys::{ImprintSource, PoseKey, ProvisionalPoseKey, Registration};
+use touch2touch::app::keys::{ImprintSource, Registration};
 use touch2touch::app::runtime::Runtime;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{ColorRange, MaskSource, MaskTool};
-use touch2touch::app::state::results::Request;
 use touch2touch::app::state::{Absent, Lookup};
 use touch2touch::app::{demand, results};
 use touch2touch_core::dataset::PairId;
@@ -63,38 +62,6 @@ fn the_pose_follows_the_mask() {
     assert!(results::accepted(&bench.state, MEASURED).is_some());
     bench.send(LabelsCommand::Undo);
     assert!(results::accepted(&bench.state, MEASURED).is_none());
-}
-
-#[test]
-fn a_pose_that_takes_a_proof_is_shown_without_it_first() {
-    let mut bench = Bench::open();
-    bench.send(panes(&[Pane::Scene, Pane::Measured]));
-    bench.send(prefer(|s| s.registration = Registration::DistanceField(None)));
-    bench.send(prefer(|s| s.mask.choice.source = MaskSource::Cad));
-    bench.send(LibraryCommand::Select(SIMULATED));
-    bench.settle();
-    let key = |bench: &Bench| results::pose_key(&bench.state, MEASURED).unwrap().unwrap();
-    let settled = key(&bench);
-    let both = |bench: &Bench, key: &PoseKey| {
-        let results = &bench.state.results;
-        let provisional = results.provisional_poses.get(&ProvisionalPoseKey(key.clone())).unwrap().clone();
-        (provisional, results.poses.get(key).unwrap().clone())
-    };
-    let (provisional, pose) = both(&bench, &settled);
-    assert!(Arc::ptr_eq(&provisional, &pose), "a good mask is registered once");
-    assert!(results::provisional_pose(&bench.state, MEASURED).is_none());
-    // All that is deeper than a threshold: no cheap search settles it.
-    bench.send(prefer(|s| s.mask.choice.source = MaskSource::Threshold));
-    bench.settle();
-    let (provisional, pose) = both(&bench, &key(&bench));
-    assert!(pose.report.certificate.is_some() && provisional.report.certificate.is_none());
-    // As it was between the two: the provisional one is shown and may not be accepted, the other one is wanted.
-    bench.state.results.poses.clear();
-    let shown = results::pose(&bench.state, MEASURED);
-    assert!(matches!(shown, Lookup::Stale(_)) && shown.shown().unwrap().angle_rad == provisional.angle_rad);
-    assert!(results::provisional_pose(&bench.state, MEASURED).is_some());
-    assert!(Action::AcceptMeasuredPose.command(&bench.state).is_none());
-    assert_eq!(demand::demands(&bench.state).first(), Some(&Request::Pose(key(&bench))));
 }
 
 #[test]

@@ -168,8 +168,8 @@ fn in_3d_both_clouds_or_their_distance_and_the_choice_is_kept_per_workspace() {
     rig.shoot("compare-clouds");
     set(&mut rig, "mean:seeds=2", "measured", VersusMode::Apart);
     let (key, apart) = results::subjects_apart(state(&rig), &mean, &measured).expect("the view shows it");
-    let cloud = state(&rig).results.clouds.get(&key.a).unwrap().surface().finger(lab::RIGHT).unwrap();
-    let other = state(&rig).results.clouds.get(&key.b).unwrap().surface().finger(lab::RIGHT).unwrap();
+    let cloud = state(&rig).results.estimates.get(&key.a).unwrap().surface().finger(lab::RIGHT).unwrap();
+    let other = state(&rig).results.estimates.get(&key.b).unwrap().surface().finger(lab::RIGHT).unwrap();
     let distances = apart.points[lab::RIGHT].as_ref().unwrap();
     assert_eq!(distances.len(), cloud.points.len());
     let imprint = |subject: &Subject| results::subject(state(&rig), subject, lab::RIGHT).ready().unwrap();

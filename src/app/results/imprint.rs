@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::super::jobs::{Job, Lane};
-use super::super::keys::{ColorKey, FlagsKey, ImprintSource, MetersKey, PictureKey, TouchKey};
+use super::super::keys::{ColorKey, EstimateKey, FlagsKey, ImprintKey, ImprintSource, PictureKey, TouchKey};
 use super::super::pane::Demand;
 use super::super::results::{self, Computes, Demands, gone};
 use super::super::services::Services;
@@ -14,18 +14,6 @@ use touch2touch_core::rig::PadId;
 use touch2touch_pipeline::compare::{Beside, beside};
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::steps::imprint::{self, flags_of};
-
-impl Computes for MetersKey {
-    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<DepthMap>> {
-        let Self(recipe, shift) = self;
-        let prediction = state.results.predictions.get(recipe)?.clone();
-        let sample = state.results.samples.get(&recipe.touch.pair)?.clone();
-        let (shift, finger) = (*shift, recipe.touch.finger);
-        Some(Job::new(Lane::Compute, "Prediction in meters", move |_| {
-            imprint::imprint_of(&prediction, shift, &sample, finger)
-        }))
-    }
-}
 
 impl Computes for ColorKey {
     fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<RgbGrid>> {
@@ -80,7 +68,7 @@ pub(crate) fn want_imprint(wants: &mut Demands<'_>, finger: PadId, touch: TouchK
     }
     match state.results.predictions.get(&recipe).map(|prediction| prediction.color.is_some()) {
         Some(true) => wants.ask(ColorKey(recipe)),
-        Some(false) => wants.ask(MetersKey(recipe, state.settings.shift)),
+        Some(false) => wants.ask(EstimateKey::imprint(&ImprintKey::Predicted(recipe, state.settings.shift))),
         None => {}
     }
 }

@@ -1,7 +1,6 @@
 //! Raw predictions: those kept on the disk, those that a pane needs, and those of the pair on screen that cost little.
 
-use std::borrow::Cow;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -15,13 +14,13 @@ use super::super::services::Services;
 use super::super::source::Source;
 use super::super::state::results::Key as _;
 use super::super::state::{Absent, State};
-use touch2touch_core::grid::RgbGrid;
 use touch2touch_core::rig::{PadId, SensorId};
 use touch2touch_core::sample::Sample;
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::job::JobCx;
 use touch2touch_pipeline::steps::bundles::{BundleInfo, BundleKind};
-use touch2touch_pipeline::steps::models::{self, KeptPrediction};
+use touch2touch_pipeline::steps::models::KeptPrediction;
+use touch2touch_pipeline::steps::predict::Generating;
 use touch2touch_pipeline::steps::prediction::Prediction;
 
 impl Computes for PredictionKey {
@@ -74,58 +73,39 @@ impl Computes for StoredKey {
     }
 }
 
-/// Makes `recipes`, all of one pair and bundle. A finger without a GelSlim image is left out where another has one.
-/// `sample` is the pair, if it is loaded; `onlooker` sees pictures on the way.
+/// Makes predictions of fingers of one pair that differ in nothing else. A finger without a picture to start from is left out
+/// where another has one. `sample` is the pair, if it is loaded; `onlooker` sees pictures on the way.
 ///
 /// # Errors
-/// If no finger has a GelSlim image, the pair or the model cannot be loaded or run, or the job was told to stop.
+/// If no finger has such a picture, the pair or the model cannot be loaded or run, or the job was told to stop.
 pub(crate) fn generate(
     services: &Services,
-    recipes: Vec<PredictionKey>,
+    mut keys: Vec<PredictionKey>,
     bundle: &BundleInfo,
     source: &Source,
     sample: Option<Arc<Sample>>,
     cx: &JobCx,
     onlooker: Option<Onlooker>,
 ) -> Result<Keyed, TaskError> {
-    let Some(first) = recipes.first() else { return Ok(Vec::new()) };
-    let rig = &source.dataset.rig;
-    let ends = bundle.ends(rig).transpose().map_err(|err| TaskError::from_error("Generate", &err))?;
-    let input = ends.ok_or_else(|| TaskError::new("Generate", "the bundle is not a generator"))?.input;
-    let sensor = rig.sensor(input).map_or("input", |sensor| &*sensor.name).to_owned();
-    let fingers: Vec<_> = recipes.iter().map(|recipe| rig.pad_key(recipe.touch.finger)).collect();
-    let missing = format!("there is no {sensor} image of the {} finger", fingers.join(" or "));
+    let Some(PredictionKey { touch, config, runtime, .. }) = keys.first().cloned() else { return Ok(Vec::new()) };
+    let generating = Generating { bundle, engine: runtime, config: &config };
+    generating.input(&source.dataset.rig)?;
     let sample = match sample {
         Some(sample) => sample,
-        None => Arc::new(source.load(first.touch.pair.pair)?),
+        None => Arc::new(source.load(touch.pair.pair)?),
     };
-    let (engine, config) = (first.runtime, first.config);
-    let touched = |recipe: PredictionKey| {
-        let touch = sample.pad(recipe.touch.finger)?;
-        let size = touch.depth().map_or([0, 0], |bubble| bubble.imprint.size());
-        Some((recipe, (touch.picture(input)?, size)))
-    };
-    // One picture for each finger, whatever the number of predictions: it is encoded once.
-    let mut pictures: BTreeMap<PadId, (Cow<'_, RgbGrid>, [usize; 2])> = BTreeMap::new();
-    let mut keys: Vec<PredictionKey> = Vec::new();
-    for (key, found) in recipes.into_iter().filter_map(touched) {
-        pictures.entry(key.touch.finger).or_insert(found);
-        keys.push(key);
-    }
-    let wanted = |key: &PredictionKey| {
-        let (picture, size) = &pictures[&key.touch.finger];
-        models::GenerateInput { difference: picture, seed: key.config.seed, size: *size }
-    };
-    let wanted: Vec<models::GenerateInput<'_>> = keys.iter().map(wanted).collect();
+    keys.retain(|key| generating.picture(&sample, key.touch.finger).is_ok_and(|picture| picture.is_some()));
     if keys.is_empty() {
-        return Err(TaskError::new("Generate", missing));
+        return Err(generating.no_input(&sample.rig));
     }
     let cx = match onlooker {
         Some(onlooker) => cx.clone().with_previews(onlooker.of(keys.clone())),
         None => cx.clone(),
     };
-    let made = services.models.predict(bundle, engine, &config, &wanted, &cx)?;
-    Ok(keys.into_iter().zip(made.into_iter().map(Arc::new)).collect())
+    let pads: Vec<PadId> = keys.iter().map(|key| key.touch.finger).collect();
+    let mut made = generating.pads(&services.models, &sample, &pads, &cx)?;
+    let keyed = |key: PredictionKey| made[key.touch.finger].take().map(|made| (key, Arc::new(made)));
+    Ok(keys.into_iter().filter_map(keyed).collect())
 }
 
 /// Asks for the predictions of a touch that were made before this start of the program.

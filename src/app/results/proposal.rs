@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use super::super::jobs::{Job, Lane};
 use super::super::keys::{
-    CadPlace, Distances, DistancesKey, ImprintSource, PairKey, ProposalInputs, ProposalKey, ToolKey,
+    CadPlace, Distances, DistancesKey, EstimateKey, ImprintSource, MaskRecipe, MaskVersion, PairKey, ProposalInputs,
+    ProposalKey, ToolKey,
 };
 use super::super::results;
 use super::super::results::{Computes, Demands};
@@ -25,7 +26,7 @@ fn cad_pose(state: &State, place: &CadPlace, pair: PairKey) -> Option<(CadPose, 
     Some(match place {
         CadPlace::Truth => (CadPose::Truth, state.results.samples.get(&pair)?.grasp_from_object?),
         CadPlace::Registered(key) => {
-            let pose = state.results.poses.get(key)?.grasp_from_object;
+            let pose = results::pose_of(state, key)?.grasp_from_object;
             (CadPose::Registered(pose), pose)
         }
         CadPlace::Hand(bits) => {
@@ -60,10 +61,11 @@ impl Computes for ProposalKey {
         };
         match &self.of {
             ProposalInputs::Automatic(recipe) => {
-                let found = state.results.masks.get(&self.automatic(recipe))?.clone();
+                let made = state.results.estimates.get(&automatic(self, recipe))?;
+                let found = made.contact().masks[self.imprint.touch().finger].clone()?;
                 let model = state.library.mask_model(recipe).to_owned();
                 let recipe = recipe.clone();
-                job(Box::new(move || Ok(propose::automatic((*found).clone(), &recipe, &model))))
+                job(Box::new(move || Ok(propose::automatic(found, &recipe, &model))))
             }
             ProposalInputs::Cad(at, within) => {
                 let key = DistancesKey { imprint: self.imprint.clone(), at: at.clone() };
@@ -76,6 +78,11 @@ impl Computes for ProposalKey {
             }
         }
     }
+}
+
+/// The automatic mask that is proposed.
+fn automatic(key: &ProposalKey, recipe: &MaskRecipe) -> EstimateKey {
+    EstimateKey::mask(&key.imprint, MaskVersion::Auto(recipe.clone()))
 }
 
 /// The recipe of the proposal for one finger's imprint; `Ok(None)` while something that it takes is not there yet.
@@ -146,8 +153,8 @@ pub(crate) fn want_proposal(wants: &mut Demands<'_>) {
     }
     let Ok(Some(key)) = proposal_key(state, source, finger) else { return };
     match &key.of {
-        ProposalInputs::Automatic(recipe) if !state.results.masks.contains(&key.automatic(recipe)) => {
-            return wants.ask(key.automatic(recipe));
+        ProposalInputs::Automatic(recipe) if !state.results.estimates.contains(&automatic(&key, recipe)) => {
+            return wants.ask(automatic(&key, recipe));
         }
         ProposalInputs::Cad(at, _) => {
             let distances = DistancesKey { imprint: key.imprint.clone(), at: at.clone() };

@@ -23,11 +23,11 @@ use touch2touch_pipeline::steps::tool::{NamedTool, named_tool, tool_file};
 
 impl Computes for RunKey {
     fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<PoseResult>> {
-        let registered = results::registered(state, &self.pose)?;
-        let (registration, start) = (self.pose.registration, self.start.map(PoseBits::get));
+        let ((estimate, tool, sample), by) = (results::registered(state, &self.pose)?, self.pose.pose.as_ref()?.1);
+        let start = self.start.map(PoseBits::get);
         Some(Job::new(Lane::Compute, "Registration, recorded", move |_| {
             let ask = Ask { starts: start.as_ref().map(std::slice::from_ref), record: true, ..Ask::default() };
-            registered.pose(registration, ask)
+            estimate.pose_by(&sample, &tool.model, &*by.method(), ask)
         }))
     }
 }
@@ -39,16 +39,16 @@ pub(crate) fn run_key(state: &State, source: ImprintSource) -> Option<RunKey> {
 
 impl Computes for InspectionKey {
     fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Inspection>> {
-        let (registered, by) = (results::registered(state, &self.0.pose)?, self.0.pose.registration);
+        let ((estimate, tool, _), by) = (results::registered(state, &self.0.pose)?, self.0.pose.pose.as_ref()?.1);
         let run = state.results.runs.get(&self.0)?.clone();
         Some(Job::new(Lane::Compute, "Steps of the registration", move |_| {
-            let points = registered.estimate.points().map_err(Clone::clone)?.clone();
-            Ok(Inspection::new(run, points, &registered.tool.model, by))
+            let points = estimate.points().map_err(Clone::clone)?.clone();
+            Ok(Inspection::new(run, points, &tool.model, by))
         }))
     }
 
     fn arrived(&self, state: &mut State, _: &Arc<Inspection>) {
-        if let Some(at) = self.0.pose.cloud.place() {
+        if let Some(at) = self.0.pose.place() {
             state.results.latest.entry(at).or_default().inspection = Some(self.clone());
         }
     }
@@ -104,7 +104,7 @@ pub(crate) fn inspected_in(state: &State, source: ImprintSource) -> Option<Inspe
 
 impl Computes for LayersKey {
     fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<LayerResult>> {
-        let estimate = state.results.clouds.get(&self.0.cloud)?.clone();
+        let estimate = state.results.estimates.get(&self.0.its_cloud())?.clone();
         let run = state.results.runs.get(&self.run())?.clone();
         Some(Job::new(Lane::Compute, "Layers of the registration", move |_| layers::layers(&estimate, &run)))
     }
@@ -130,10 +130,10 @@ pub(crate) fn want_layers(wants: &mut Demands<'_>, source: ImprintSource) {
 
 impl Computes for DeviationKey {
     fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Deviation>> {
-        let registered = results::registered(state, &self.0)?;
-        let pose = state.results.poses.get(&self.0)?.grasp_from_object;
+        let (estimate, tool, _) = results::registered(state, &self.0)?;
+        let pose = results::pose_of(state, &self.0)?.grasp_from_object;
         Some(Job::new(Lane::Compute, "Distances to the model", move |_| {
-            Ok(deviation::deviation(registered.estimate.surface(), &registered.tool.model, pose))
+            Ok(deviation::deviation(estimate.surface(), &tool.model, pose))
         }))
     }
 }
@@ -148,7 +148,7 @@ pub fn deviation(state: &State, source: ImprintSource) -> Lookup<'_, Deviation> 
 pub(crate) fn want_deviation(wants: &mut Demands<'_>, source: ImprintSource) {
     let state = wants.state;
     let Ok(Some(pose)) = results::pose_key(state, source) else { return };
-    if results::shows_deviation(state, source) && state.results.poses.contains(&pose) {
+    if results::shows_deviation(state, source) && results::pose_of(state, &pose).is_some() {
         wants.ask(DeviationKey(pose));
     }
 }
@@ -156,8 +156,8 @@ pub(crate) fn want_deviation(wants: &mut Demands<'_>, source: ImprintSource) {
 impl Computes for RankingKey {
     fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Vec<Candidate>>> {
         let open = state.library.open.as_ref()?;
-        let (source, registered, registration) =
-            (open.source.clone(), results::registered(state, &self.0)?, self.0.registration);
+        let ((estimate, _, sample), by) = (results::registered(state, &self.0)?, self.0.pose.as_ref()?.1);
+        let source = open.source.clone();
         let known = |name: String| {
             let key = ToolKey { dataset: open.seq, name: name.as_str().into() };
             (name, state.results.tools.get(&key).cloned())
@@ -174,14 +174,14 @@ impl Computes for RankingKey {
                 models.extend(known.or_else(read));
             }
             let tools = models.iter().map(|tool| (tool.name.as_str(), &tool.model));
-            registered.estimate.which_tool(&registered.sample, tools, &*registration.method())
+            estimate.which_tool(&sample, tools, &*by.method())
         }))
     }
 
     fn wanted(wants: &mut Demands<'_>) {
         for source in ImprintSource::iter() {
             if let Some(key) = ranking_key(wants.state, source)
-                && wants.state.results.poses.contains(&key.0)
+                && results::pose_of(wants.state, &key.0).is_some()
             {
                 wants.ask(key);
             }

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use super::super::jobs::{Job, Lane};
 use super::super::keys::{
-    CloudDifferenceKey, CloudKey, ComparedKey, ImprintKey, ImprintSource, MaskKey, MeanKey, MetersKey, PictureKey,
-    PoseKey, PredictionKey, ShiftMode, TouchKey, VersusKey,
+    CloudDifferenceKey, ComparedKey, EstimateKey, ImprintKey, ImprintSource, MaskRecipe, MeanKey, PictureKey,
+    PredictionKey, ShiftMode, TouchKey, VersusKey,
 };
 use super::super::pane::Demand;
 use super::super::results::{Computes, Demands};
@@ -15,7 +15,7 @@ use super::super::state::settings::versus::{Versus, VersusMode};
 use super::super::state::{Absent, Lookup, State};
 use super::super::{recipe, results};
 use touch2touch_core::grid::DepthMap;
-use touch2touch_core::rig::PadId;
+use touch2touch_core::rig::{PadId, PerPad};
 use touch2touch_core::sample::Sample;
 use touch2touch_pipeline::compare::depict::mean;
 use touch2touch_pipeline::compare::deviation::{CloudDifference, cloud_difference};
@@ -28,12 +28,11 @@ use touch2touch_pipeline::steps::prediction::Prediction;
 
 impl Computes for MeanKey {
     fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<DepthMap>> {
-        let meters =
-            |recipe: &PredictionKey| state.results.imprints.get(&MetersKey(recipe.clone(), self.shift)).cloned();
-        let imprints: Vec<Arc<DepthMap>> = self.recipes.iter().map(meters).collect::<Option<_>>()?;
-        Some(Job::new(Lane::Compute, "Mean of the seeds", move |_| {
-            mean(&imprints.iter().map(|i| &**i).collect::<Vec<_>>())
-        }))
+        let meters = |made: &PredictionKey| {
+            results::imprint_of(state, &ImprintKey::Predicted(made.clone(), self.shift)).ready().cloned()
+        };
+        let imprints: Vec<DepthMap> = self.recipes.iter().map(meters).collect::<Option<_>>()?;
+        Some(Job::new(Lane::Compute, "Mean of the seeds", move |_| mean(&imprints.iter().collect::<Vec<_>>())))
     }
 }
 
@@ -108,7 +107,7 @@ impl Computes for VersusKey {
 
 impl Computes for CloudDifferenceKey {
     fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<CloudDifference>> {
-        let cloud = |key: &CloudKey| state.results.clouds.get(key).cloned();
+        let cloud = |key: &EstimateKey| state.results.estimates.get(key).cloned();
         let (a, b) = (cloud(&self.a)?, cloud(&self.b)?);
         Some(Job::new(Lane::Compute, "Distances between clouds", move |_| Ok(cloud_difference(&a, &b))))
     }
@@ -198,32 +197,35 @@ pub fn subjects_compared<'a>(state: &'a State, a: &Subject, b: &Subject, finger:
     }
 }
 
-/// The cloud of a subject, the contact by the masks in force on the two sides that are always shown, else by
-/// automatic ones; `Err` holds the masks that are missing for it.
-fn subject_cloud(state: &State, subject: &Subject) -> Result<CloudKey, Vec<MaskKey>> {
-    match side_of(subject) {
-        Some(side) => results::cloud_key(state, side).ok().flatten().ok_or_else(Vec::new),
-        None => {
-            let fingers =
-                state.rig().pads().filter_map(|finger| Some((finger, subject_key(state, subject, finger).ok()?)));
-            results::automatic_cloud(state, fingers)
+/// The cloud of a subject; `None` while an imprint of it is not there.
+fn subject_cloud(state: &State, subject: &Subject) -> Option<EstimateKey> {
+    if let Some(side) = side_of(subject) {
+        return results::cloud_key(state, side).ok()?;
+    }
+    let mut parts = PerPad::default();
+    for finger in state.rig().pads() {
+        let camera = results::touch(state, finger).ready().is_some_and(|t| t.camera().is_some());
+        let Some(imprint) = subject_key(state, subject, finger).ok().filter(|_| camera) else { continue };
+        results::imprint_of(state, &imprint).ready()?;
+        if let Some(mask) = results::mask_version(state, &imprint, finger) {
+            parts[finger] = Some((imprint, Some(mask)));
         }
     }
+    (!parts.is_empty()).then(|| EstimateKey::cloud(parts))
 }
 
 /// The surface points of a subject, where they are there, with their recipe.
-pub(crate) fn subject_points<'a>(state: &'a State, subject: &Subject) -> Option<(CloudKey, &'a Clouds)> {
-    let key = subject_cloud(state, subject).ok()?;
-    let found = state.results.clouds.get(&key)?.surface();
+pub(crate) fn subject_points<'a>(state: &'a State, subject: &Subject) -> Option<(EstimateKey, &'a Clouds)> {
+    let key = subject_cloud(state, subject)?;
+    let found = state.results.estimates.get(&key)?.surface();
     Some((key, found))
 }
 
-fn subject_pose_key(state: &State, subject: &Subject) -> Option<PoseKey> {
+fn subject_pose_key(state: &State, subject: &Subject) -> Option<EstimateKey> {
     if let Some(side) = side_of(subject) {
         return results::pose_key(state, side).ok()?;
     }
-    let cloud = subject_cloud(state, subject).ok()?;
-    Some(PoseKey::of(cloud, results::tool_name(state).ok()?.into(), &recipe::in_force(state, ImprintSource::Predicted)))
+    Some(subject_cloud(state, subject)?.posed(results::tool_name(state).ok()?, state.settings.registration))
 }
 
 /// Why the subjects have no poses, if they cannot have any.
@@ -238,7 +240,7 @@ pub(crate) fn pose_absent(state: &State) -> Option<Absent> {
 
 /// The pose of a subject, where it is there.
 pub fn subject_pose<'a>(state: &'a State, subject: &Subject) -> Option<&'a PoseResult> {
-    state.results.poses.get(&subject_pose_key(state, subject)?).map(|pose| &**pose)
+    results::pose_of(state, &subject_pose_key(state, subject)?)
 }
 
 /// The distances of the points of one subject from those of another, where they are there, with their key.
@@ -247,7 +249,7 @@ pub fn subjects_apart<'a>(
     a: &Subject,
     b: &Subject,
 ) -> Option<(CloudDifferenceKey, &'a CloudDifference)> {
-    let key = CloudDifferenceKey { a: subject_cloud(state, a).ok()?, b: subject_cloud(state, b).ok()? };
+    let key = CloudDifferenceKey { a: subject_cloud(state, a)?, b: subject_cloud(state, b)? };
     let found = state.results.apart.get(&key)?;
     Some((key, found))
 }
@@ -287,11 +289,11 @@ pub(crate) fn want_versus(wants: &mut Demands<'_>) {
     for subject in &both {
         want_subject_place(wants, subject);
     }
-    let clouds = both.each_ref().map(|subject| subject_cloud(state, subject).ok());
+    let clouds = both.each_ref().map(|subject| subject_cloud(state, subject));
     if let [Some(a), Some(b)] = clouds
         && mode == VersusMode::Apart
-        && state.results.clouds.contains(&a)
-        && state.results.clouds.contains(&b)
+        && state.results.estimates.contains(&a)
+        && state.results.estimates.contains(&b)
     {
         wants.ask(CloudDifferenceKey { a, b });
     }
@@ -318,8 +320,8 @@ pub(crate) fn want_subject(wants: &mut Demands<'_>, subject: &Subject, finger: P
             let mut whole = true;
             for recipe in recipes {
                 if state.results.predictions.contains(&recipe) {
-                    let meters = MetersKey(recipe, shift);
-                    whole &= state.results.imprints.contains(&meters);
+                    let meters = EstimateKey::imprint(&ImprintKey::Predicted(recipe, shift));
+                    whole &= state.results.estimates.contains(&meters);
                     wants.ask(meters);
                 } else {
                     whole = false;
@@ -336,26 +338,17 @@ pub(crate) fn want_subject(wants: &mut Demands<'_>, subject: &Subject, finger: P
     }
 }
 
-/// Masks, cloud and pose of a subject.
+/// Cloud and pose of a subject.
 pub(crate) fn want_subject_place(wants: &mut Demands<'_>, subject: &Subject) {
     let state = wants.state;
     if let Some(side) = side_of(subject) {
-        for finger in state.rig().pads() {
-            results::want_mask(wants, side, finger);
-        }
-        if results::want_cloud(wants, side) {
-            results::want_pose(wants, side);
-        }
-        return;
+        return results::want_side(wants, side, [true, true], |_| true);
     }
     results::want_tool(wants);
-    match subject_cloud(state, subject) {
-        Err(missing) => missing.into_iter().for_each(|mask| wants.ask(mask)),
-        Ok(cloud) if !state.results.clouds.contains(&cloud) => wants.ask(cloud),
-        Ok(_) if results::tool(state).ready().is_some() => {
-            subject_pose_key(state, subject).into_iter().for_each(|pose| wants.ask(pose));
-        }
-        Ok(_) => {}
+    let tool = results::tool(state).ready().is_some();
+    if tool || !matches!(recipe::automatic_mask(state), Ok(MaskRecipe::Cad(_))) {
+        let key = if tool { subject_pose_key(state, subject) } else { subject_cloud(state, subject) };
+        key.into_iter().for_each(|key| wants.ask(key));
     }
 }
 

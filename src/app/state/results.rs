@@ -8,13 +8,11 @@ use std::sync::Arc;
 
 use super::super::keys::dataset::Read;
 use super::super::keys::{
-    CloudKey, Distances, ImprintSource, Inspection, InspectionKey, Keyed, PairKey, PoseKey, PredictionKey, Preview,
-    TouchKey,
+    Distances, EstimateKey, ImprintSource, Inspection, InspectionKey, Keyed, PairKey, PredictionKey, Preview, TouchKey,
 };
 use super::cache::Cache;
 use super::shown::Shown;
 use touch2touch_core::ambiguity::Ambiguity;
-use touch2touch_core::contact::ContactMask;
 use touch2touch_core::grid::{DepthMap, RgbGrid};
 use touch2touch_core::postprocess::Flag;
 use touch2touch_core::sample::Sample;
@@ -54,8 +52,6 @@ macro_rules! table {
         Prefetch(PrefetchKey => Prediction);
         /// The mean of several predictions of one touch.
         Mean(MeanKey => DepthMap, |mean| mean.len() * 4) in means, 16 * MIB;
-        /// A prediction in meters, as large as the bubble image.
-        Imprint(MetersKey => DepthMap, |imprint| imprint.len() * 4) in imprints, 64 * MIB;
         /// A prediction of a color sensor: differences, 0..255 scale.
         Color(ColorKey => RgbGrid, |picture| picture.len() * 12) in colors, 32 * MIB;
         /// The prediction of another program that lies beside a pair as a picture.
@@ -70,8 +66,6 @@ macro_rules! table {
         Flags(FlagsKey => Vec<Flag>, |found| found.len() * 512) in flags, MIB;
         /// The ambiguity of a GelSlim image: what it leaves open.
         Ambiguity(AmbiguityKey => Option<Ambiguity>, |found| size_of_val(found)) in ambiguities, MIB;
-        /// An automatic mask.
-        Mask(MaskKey => ContactMask, |found| found.mask.len()) in masks, 32 * MIB;
         /// The plan of an export of masks: what it would write where.
         MaskPlan(MaskPlanKey => Plan, |plan| plan.total() * 128) in mask_plans, MIB;
         /// The plan of an import of masks: what it would change.
@@ -82,12 +76,8 @@ macro_rules! table {
         Proposal(ProposalKey => Proposal, |found| found.mask.len()) in proposals, 16 * MIB;
         /// The plan of a training of the mask model: what it would learn from.
         TrainPlan(TrainPlanKey => TrainPlan, |plan| (plan.masks() + plan.held_out[0]) * 256) in train_plans, MIB;
-        /// A cloud.
-        Cloud(CloudKey => Estimate, Estimate::bytes) in clouds, 128 * MIB;
-        /// A pose.
-        Pose(PoseKey => PoseResult, PoseResult::bytes) in poses, 32 * MIB;
-        /// A pose without its proof: shown until that is there.
-        ProvisionalPose(ProvisionalPoseKey => PoseResult, PoseResult::bytes) in provisional_poses, 3 * MIB;
+        /// An estimate: imprints, masks, cloud and pose as far as a pane needs them.
+        Estimate(EstimateKey => Estimate, Estimate::bytes) in estimates, 259 * MIB;
         /// A registration with everything recorded.
         Run(RunKey => PoseResult, PoseResult::bytes) in runs, 32 * MIB;
         /// Reasons, residuals and distances of a recorded registration from the registration's own starts.
@@ -127,9 +117,9 @@ pub(crate) trait Cached: Key + Into<Request> {
 #[derive(Clone, Debug, Default)]
 pub struct Latest {
     /// The cloud.
-    pub cloud: Option<CloudKey>,
+    pub cloud: Option<EstimateKey>,
     /// The pose.
-    pub pose: Option<PoseKey>,
+    pub pose: Option<EstimateKey>,
     /// The recorded registration.
     pub inspection: Option<InspectionKey>,
 }

@@ -53,8 +53,7 @@ impl CloudDifference {
     }
 }
 
-/// Measures the surface points of `a` against those of `b`, both by [`Estimate::of_masks`]; their imprints say which is
-/// deeper.
+/// Measures the surface points of `a` against those of `b`, both with their surface; their imprints say which is deeper.
 pub fn cloud_difference(a: &Estimate, b: &Estimate) -> CloudDifference {
     let (mut squares, mut count) = (0.0, 0usize);
     let mut points = PerPad::default();

@@ -6,7 +6,7 @@ use eframe::egui::{Align2, Color32, FontId, Ui, pos2, vec2};
 use glam::DVec3;
 
 use super::{Letter, color};
-use crate::app::keys::{CloudDifferenceKey, CloudKey, DatasetSeq};
+use crate::app::keys::{CloudDifferenceKey, DatasetSeq, EstimateKey};
 use crate::app::results;
 use crate::app::settings::{SceneLayer, Versus, VersusMode};
 use crate::gpu::mesh::{Look, MeshItem, MeshStyle, Shading};
@@ -39,7 +39,7 @@ pub(super) struct Space {
 
 /// The points of one of the two, made once.
 struct Held {
-    key: CloudKey,
+    key: EstimateKey,
     revision: u64,
     fingers: PerPad<[Arc<[DVec3]>; 2]>,
 }
@@ -102,7 +102,7 @@ fn missing(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus) {
 fn update(cx: &Cx<'_>, space: &mut Space, versus: &Versus) {
     for (held, letter) in space.clouds.iter_mut().zip([Letter::A, Letter::B]) {
         let points = results::subject_points(cx.state, letter.of(versus));
-        let same_pair = |key: &CloudKey| key.place().map(|(pair, _)| pair) == cx.state.pair_key();
+        let same_pair = |key: &EstimateKey| key.place().map(|(pair, _)| pair) == cx.state.pair_key();
         match points {
             Some((key, _)) if held.as_ref().is_some_and(|held| held.key == key) => {}
             Some((key, clouds)) => {
@@ -119,7 +119,7 @@ fn update(cx: &Cx<'_>, space: &mut Space, versus: &Versus) {
         (None, _) => space.apart = None,
         (Some((key, _)), Some((held, ..))) if *held == key => {}
         (Some((key, difference)), _) => {
-            if let Some(clouds) = cx.state.results.clouds.get(&key.a).map(|estimate| estimate.surface()) {
+            if let Some(clouds) = cx.state.results.estimates.get(&key.a).map(|estimate| estimate.surface()) {
                 space.revision += 1;
                 let colored = |pad, values: &Vec<f32>| {
                     let points = clouds.finger(pad)?.points.as_slice().into();
