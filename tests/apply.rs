@@ -15,7 +15,7 @@ use std::collections::BTreeSet;
 
 use strum::IntoEnumIterator as _;
 use touch2touch::app::command::{Command, LibraryCommand, Pane, PredictCommand, TasksCommand, ViewCommand};
-use touch2touch::app::jobs::Lane;
+use touch2touch::app::jobs::Worker;
 use touch2touch::app::keys::{ImprintSource, ShiftMode};
 use touch2touch::app::library::{Place, Sort};
 use touch2touch::app::settings::prefer;
@@ -181,7 +181,7 @@ fn the_newest_request_replaces_a_waiting_one() {
     }
     let last = bench.state.pair_key().unwrap();
     assert_eq!(last.pair, PairId(11));
-    assert!(bench.runtime.waiting(Lane::Files) <= 2 + 4 + 1, "labels, the pair, four neighbors and the settings");
+    assert!(bench.runtime.waiting(Worker::Files) <= 2 + 4 + 1, "labels, the pair, four neighbors and the settings");
     bench.settle();
     assert!(!bench.state.results.samples.contains(&first));
     assert!(bench.state.results.samples.contains(&last));
@@ -226,7 +226,7 @@ fn preferences_are_kept_in_range_and_saved() {
     let range = bench.state.settings.range;
     bench.send(prefer(move |s| (s.range.min_m, s.range.max_m) = (1.0, f32::NAN)));
     assert_eq!(bench.state.settings.range, range);
-    assert_eq!(bench.runtime.waiting(Lane::Files), 1, "changes that wait for the disk become one");
+    assert_eq!(bench.runtime.waiting(Worker::Files), 1, "changes that wait for the disk become one");
     bench.settle();
     assert_eq!(bench.folders.services(false).load_settings().0.mask_opacity, 0.0);
 }

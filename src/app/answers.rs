@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::effect::{Effect, Ended, NotSaved};
-use super::jobs::Lane;
+use super::effect::{Effect, NotSaved, TaskResult};
+use super::jobs::Worker;
 use super::keys::{DatasetSeq, Preview, Revision};
 use super::source::Followed;
 use super::state::State;
@@ -36,8 +36,8 @@ pub enum Answer {
     Previewed(Ticket, Arc<Preview>),
     /// A job is under way.
     Progressed(Ticket, Progress),
-    /// An errand is done.
-    Ended(Ticket, Ended),
+    /// A task is done.
+    TaskResult(Ticket, TaskResult),
     /// The system was asked to show a place.
     Revealed,
     /// It ended without a result.
@@ -87,7 +87,7 @@ pub(super) fn step(state: &mut State, answer: Answer, effects: &mut Vec<Effect>)
                 task.progress = progress;
             }
         }
-        Answer::Ended(ticket, end) => ended(state, ticket, &end, effects),
+        Answer::TaskResult(ticket, end) => apply_result(state, ticket, &end, effects),
         Answer::TaskFailed(ticket, err) => failed_task(state, ticket, &err),
         Answer::RequestFailed(seq, request, err) if state.library.is_open(seq) => failed_request(state, *request, err),
         Answer::LabelsSaved(name, revision, merged) => {
@@ -111,15 +111,15 @@ pub(super) fn step(state: &mut State, answer: Answer, effects: &mut Vec<Effect>)
     }
 }
 
-/// Lets follow what follows from the end of what a person started.
-fn ended(state: &mut State, ticket: Ticket, end: &Ended, effects: &mut Vec<Effect>) {
+/// Applies the result of a task.
+fn apply_result(state: &mut State, ticket: Ticket, end: &TaskResult, effects: &mut Vec<Effect>) {
     let task = tasks::forget(state, ticket);
     // What took minutes and is of another data set has nowhere to be shown.
-    if end.kind.lane() == Lane::Batch && task.is_none_or(|task| task.outdated) {
+    if end.kind.worker() == Worker::Batch && task.is_none_or(|task| task.outdated) {
         return;
     }
     let before = state.library.open.as_ref().map(|open| (open.seq, open.place.clone()));
-    end.land(state, effects);
+    end.apply_to(state, effects);
     if let Some(open) = &state.library.open
         && before.as_ref().is_none_or(|(seq, _)| *seq != open.seq)
     {

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::effect::{Access, Effect, Errand};
+use super::effect::{Access, Effect, Task};
 use super::keys::{DatasetSeq, ImprintSource};
 use super::learn::{self, AdaptPairs, LearnCommand, Network};
 use super::library::{self, LibraryCommand};
@@ -94,8 +94,8 @@ fn carry_out(state: &mut State, cure: Cure, effects: &mut Vec<Effect>) {
         }
         Cure::Examine { .. } => {
             let Some(source) = state.library.open.as_ref().map(|open| open.source.clone()) else { return };
-            let errand = Examine { source, recipe: tried_recipe(state) };
-            tasks::start(state, TaskKind::Examine.name(), errand, effects);
+            let task = Examine { source, recipe: tried_recipe(state) };
+            tasks::start(state, TaskKind::Examine.name(), task, effects);
         }
     }
 }
@@ -155,7 +155,7 @@ pub struct TryModels {
     recipe: Recipe,
 }
 
-impl Errand for TryModels {
+impl Task for TryModels {
     type End = Option<Arc<Worth>>;
     const KIND: TaskKind = TaskKind::TryModels;
 
@@ -174,7 +174,7 @@ pub struct Examine {
     recipe: Recipe,
 }
 
-impl Errand for Examine {
+impl Task for Examine {
     type End = Arc<Examined>;
     const KIND: TaskKind = TaskKind::Examine;
 
@@ -196,7 +196,7 @@ pub struct ReadOtherwise {
     list: String,
 }
 
-impl Errand for ReadOtherwise {
+impl Task for ReadOtherwise {
     /// The data set that it is of, the file that says so, and what it says.
     type End = (DatasetSeq, PathBuf, String);
     const KIND: TaskKind = TaskKind::ReadOtherwise;

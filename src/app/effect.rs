@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::jobs::Lane;
+use super::jobs::Worker;
 use super::keys::{DatasetSeq, Revision};
 use super::results::preview::Onlooker;
 use super::services::Services;
@@ -43,7 +43,7 @@ pub struct NotSaved {
     pub err: TaskError,
 }
 
-/// The access of an errand to what it does not hold itself.
+/// The access of a task to what it does not hold itself.
 pub struct Access {
     /// Files and models.
     pub services: Arc<Services>,
@@ -52,7 +52,7 @@ pub struct Access {
 }
 
 /// A job that a person starts, with all that it needs. `tasks::start` lists it; the rest follows.
-pub trait Errand: Send + 'static {
+pub trait Task: Send + 'static {
     /// The value that it ends with.
     type End: Send + Sync + 'static;
 
@@ -64,9 +64,9 @@ pub trait Errand: Send + 'static {
         Self::KIND.name().to_owned()
     }
 
-    /// The lane that it runs on.
-    fn lane(&self) -> Lane {
-        Self::KIND.lane()
+    /// The worker that it runs on.
+    fn worker(&self) -> Worker {
+        Self::KIND.worker()
     }
 
     /// Does it.
@@ -79,59 +79,59 @@ pub trait Errand: Send + 'static {
     fn ended(end: &Self::End, state: &mut State, effects: &mut Vec<Effect>);
 }
 
-/// The body of an errand.
-type Doing = Box<dyn FnOnce(&Access, &JobCx) -> Result<Ended, TaskError> + Send>;
+/// The body of a task.
+type Doing = Box<dyn FnOnce(&Access, &JobCx) -> Result<TaskResult, TaskError> + Send>;
 /// The consequences of its end.
 type Follows = Arc<dyn Fn(&mut State, &mut Vec<Effect>) + Send + Sync>;
 
-/// An errand on its way to its lane.
-pub struct Started {
+/// A task on its way to its worker.
+pub struct TaskJob {
     /// The work that it does, for errors.
     pub what: String,
-    /// The lane that it runs on.
-    pub lane: Lane,
+    /// The worker that it runs on.
+    pub worker: Worker,
     /// The way.
     pub body: Doing,
 }
 
-impl Started {
-    /// An errand of any kind.
-    pub(super) fn new<E: Errand>(errand: E) -> Self {
-        let (what, lane) = (errand.what(), errand.lane());
-        Self { what, lane, body: Box::new(|access, cx| Ok(Ended::of::<E>(errand.run(access, cx)?))) }
+impl TaskJob {
+    /// A task of any kind.
+    pub(super) fn new<E: Task>(task: E) -> Self {
+        let (what, worker) = (task.what(), task.worker());
+        Self { what, worker, body: Box::new(|access, cx| Ok(TaskResult::of::<E>(task.run(access, cx)?))) }
     }
 }
 
-/// The end of an errand.
+/// The end of a task.
 #[derive(Clone)]
-pub struct Ended {
+pub struct TaskResult {
     /// The kind.
     pub kind: TaskKind,
     follows: Follows,
 }
 
-impl Ended {
+impl TaskResult {
     /// With what follows from it.
-    pub fn of<E: Errand>(end: E::End) -> Self {
+    pub fn of<E: Task>(end: E::End) -> Self {
         Self { kind: E::KIND, follows: Arc::new(move |state, effects| E::ended(&end, state, effects)) }
     }
 
     /// Lets that follow.
-    pub(super) fn land(&self, state: &mut State, effects: &mut Vec<Effect>) {
+    pub(super) fn apply_to(&self, state: &mut State, effects: &mut Vec<Effect>) {
         (self.follows)(state, effects);
     }
 }
 
-impl std::fmt::Debug for Ended {
+impl std::fmt::Debug for TaskResult {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "Ended({:?})", self.kind)
+        write!(f, "TaskResult({:?})", self.kind)
     }
 }
 
 /// Work that leaves the state.
 pub enum Effect {
     /// Do what a person started.
-    Start(Ticket, Started),
+    Start(Ticket, TaskJob),
     /// Tell it to stop.
     Cancel(Ticket),
     /// Follow the folder of a data set, or none any more.

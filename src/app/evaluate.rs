@@ -6,8 +6,8 @@ pub use super::state::evaluate::ScoreChoice;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::effect::{Access, Effect, Errand};
-use super::jobs::Lane;
+use super::effect::{Access, Effect, Task};
+use super::jobs::Worker;
 use super::source::Source;
 use super::state::State;
 use super::state::library::Sort;
@@ -55,7 +55,7 @@ pub(super) fn step(state: &mut State, command: EvaluateCommand, effects: &mut Ve
             let Some(evaluation) = state.table.result.clone() else { return };
             let published = state.table.published;
             let what = "Export the table";
-            let write = tasks::Write::new(Lane::Files, what, folder, move |folder, _, _| {
+            let write = tasks::Write::new(Worker::Files, what, folder, move |folder, _, _| {
                 let folder = evaluate::export(&evaluation, published, &folder)?;
                 let line = format!("Wrote evaluation.csv and .json to {}", folder.display());
                 Ok((line, folder))
@@ -89,7 +89,7 @@ pub struct Score {
     setup: Setup,
 }
 
-impl Errand for Score {
+impl Task for Score {
     type End = Arc<Evaluation>;
     const KIND: TaskKind = TaskKind::Evaluate;
 

@@ -12,7 +12,7 @@ pub(crate) use setup::{can_draw, still_setup};
 use std::path::PathBuf;
 
 use super::effect::Effect;
-use super::jobs::Lane;
+use super::jobs::Worker;
 use super::labels::ImportMasks;
 use super::results;
 use super::state::State;
@@ -80,7 +80,7 @@ fn write(state: &mut State, output: Output, file: PathBuf, effects: &mut Vec<Eff
             let Some(source) = state.library.open.as_ref().map(|open| open.source.clone()) else { return };
             state.export.asking_masks = false;
             let (labels, choice) = (state.document.finished_labels(), state.export.masks);
-            let write = Write::new(Lane::Compute, "Export masks", file, move |folder, _, cx| {
+            let write = Write::new(Worker::Compute, "Export masks", file, move |folder, _, cx| {
                 let setup = ExportSetup { pairs: None, choice };
                 let masks = DrawnMasks { labels: &Labels::of(&source.dataset), changed: &labels };
                 let (plan, _) = export_masks(&source.dataset, &masks, &setup, &folder, None, cx)?;
@@ -93,7 +93,7 @@ fn write(state: &mut State, output: Output, file: PathBuf, effects: &mut Vec<Eff
                 let err = TaskError::new("Export the pair", format!("it has no {} points", source.key()));
                 return state.log.error(&err.with_hint("Show it in 3D first."));
             };
-            let write = Write::new(Lane::Compute, "Export the pair", file, move |folder, _, _| {
+            let write = Write::new(Worker::Compute, "Export the pair", file, move |folder, _, _| {
                 let files = pair.write(&folder)?;
                 let names = files.iter().filter_map(|file| file.file_name()).map(|name| name.to_string_lossy());
                 let text = format!("Saved {}", names.collect::<Vec<_>>().join(", "));
@@ -106,7 +106,7 @@ fn write(state: &mut State, output: Output, file: PathBuf, effects: &mut Vec<Eff
             let source = open.source.clone();
             let png = asked.turntable.is_none() && file.extension().is_none();
             let file = if png { file.with_extension("png") } else { file };
-            let write = Write::new(Lane::Models, "Still", file, move |file, access, cx| {
+            let write = Write::new(Worker::Models, "Still", file, move |file, access, cx| {
                 let drawer = spatial::stills()?;
                 let done = still(&source.dataset, &setup, &access.services.models, drawer, &file, cx)?;
                 let ([width, height], count) = (done.size_px, done.files.len());

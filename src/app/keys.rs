@@ -48,10 +48,6 @@ named! {
     PictureKey(TouchKey);
     /// The ambiguity of the GelSlim image of a touch.
     AmbiguityKey(TouchKey);
-    /// A prediction that nobody asked for. Whoever goes on to another pair has it stopped.
-    PrefetchKey(PredictionKey);
-    /// A prediction that is compared with something.
-    ComparedKey(PredictionKey);
     /// A prediction of a color sensor, as a picture.
     ColorKey(PredictionKey);
     /// Implausible things about the way of a prediction to meters.
@@ -62,8 +58,6 @@ named! {
     DeviationKey(EstimateKey);
     /// The tools of the data set, ranked for the touch that a pose is of.
     RankingKey(EstimateKey);
-    /// The steps of a recorded registration.
-    InspectionKey(RunKey);
 }
 
 /// Counts the data sets opened since the start: results of an earlier one never reach a later one.

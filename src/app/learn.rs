@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::effect::{Access, Effect, Errand};
+use super::effect::{Access, Effect, Task};
 use super::keys::ImprintSource;
 use super::pane::Pane;
 use super::settings::{self, prefer};
@@ -129,7 +129,7 @@ pub enum Learned {
     Masks(Arc<Trained>, BundleInfo),
 }
 
-impl Errand for Learn {
+impl Task for Learn {
     type End = Learned;
     const KIND: TaskKind = TaskKind::Learn;
 

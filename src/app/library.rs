@@ -6,7 +6,7 @@ pub use super::state::library::{Follow, Library, Place, Sort, short_name};
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::effect::{Access, Effect, Errand};
+use super::effect::{Access, Effect, Task};
 use super::keys::DatasetSeq;
 use super::source::Source;
 use super::state::State;
@@ -83,8 +83,8 @@ pub(super) fn step(state: &mut State, command: LibraryCommand, effects: &mut Vec
         }
         LibraryCommand::ReadToolAs { tool, unit, replacing } => {
             if let Some((source, seq)) = state.library.open.as_ref().map(|open| (open.source.clone(), open.seq)) {
-                let errand = ReadTool { seq, source, tool, unit, replacing };
-                tasks::start(state, errand.what(), errand, effects);
+                let task = ReadTool { seq, source, tool, unit, replacing };
+                tasks::start(state, task.what(), task, effects);
             }
         }
         LibraryCommand::SetFilter(filter) => {
@@ -128,8 +128,8 @@ fn open(state: &mut State, place: Place, effects: &mut Vec<Effect>) {
     let seq = state.library.last_seq;
     state.library.opening = Some(place.clone());
     state.library.failure = None;
-    let errand = Open { seq, place };
-    if let Some(task) = tasks::start(state, errand.what(), errand, effects) {
+    let task = Open { seq, place };
+    if let Some(task) = tasks::start(state, task.what(), task, effects) {
         task.opening = Some(seq);
     }
 }
@@ -141,7 +141,7 @@ pub struct Open {
     place: Place,
 }
 
-impl Errand for Open {
+impl Task for Open {
     type End = (DatasetSeq, Place, Arc<Source>);
     const KIND: TaskKind = TaskKind::Open;
 
@@ -172,7 +172,7 @@ pub struct ReadTool {
     replacing: Option<String>,
 }
 
-impl Errand for ReadTool {
+impl Task for ReadTool {
     /// The data set that it is of, and what was done.
     type End = (DatasetSeq, UnitSet);
     const KIND: TaskKind = TaskKind::ReadTool;

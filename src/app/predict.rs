@@ -6,7 +6,7 @@ pub use refit::Refit;
 
 use std::sync::Arc;
 
-use super::effect::{Access, Effect, Errand};
+use super::effect::{Access, Effect, Task};
 use super::keys::{Keyed, PredictionKey};
 use super::results::prediction;
 use super::source::Source;
@@ -96,8 +96,8 @@ fn start(state: &mut State, fingers: &[PadId], effects: &mut Vec<Effect>) {
     }
     let names: Vec<Text> = recipes.iter().map(|recipe| state.finger_name(recipe.touch.finger)).collect();
     let title = format!("Generate {} {}", state.pair_name(), names.join(" and "));
-    let errand = Generate { recipes: recipes.clone(), bundle, source, sample };
-    if let Some(task) = tasks::start(state, title, errand, effects) {
+    let task = Generate { recipes: recipes.clone(), bundle, source, sample };
+    if let Some(task) = tasks::start(state, title, task, effects) {
         task.recipes = recipes;
     }
 }
@@ -111,7 +111,7 @@ pub struct Generate {
     sample: Option<Arc<Sample>>,
 }
 
-impl Errand for Generate {
+impl Task for Generate {
     type End = Keyed;
     const KIND: TaskKind = TaskKind::Generate;
 

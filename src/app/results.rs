@@ -37,7 +37,7 @@ pub use manual::{accepted, accepted_elsewhere, by_hand, manual_begins, shown_pos
 pub(crate) use manual::{shown_imprint, sides_apart};
 pub use mask::{MaskInForce, drawn_mask, mask_in_force, mask_places};
 pub(crate) use mask::{
-    automatic_mask, automatic_provenance, drawn_mask_on, mask_place, mask_recipe, mask_version, want_mask,
+    automatic_mask, automatic_provenance, awaits_tool, drawn_mask_on, mask_place, mask_recipe, mask_version, want_mask,
 };
 pub use on_screen::proposes;
 pub(crate) use on_screen::{fingers_to_generate, shows_cloud, shows_deviation, shows_layers, shows_steps};
@@ -96,8 +96,8 @@ macro_rules! computing {
         /// The job of a request; `None` if an input is not there (any more).
         pub(super) fn job(request: &Request, state: &State, services: &Arc<Services>) -> Option<Job<Computed>> {
             match request { $( Request::$variant(key) => {
-                let done = key.clone();
-                Some(key.job(state, services)?.map(move |value| Computed::$variant(done, Arc::new(value))))
+                let (done, Job { worker, what, body }) = (key.clone(), key.job(state, services)?);
+                Some(Job::new(worker, what, move |cx| Ok(Computed::$variant(done, Arc::new(body(cx)?)))))
             } )* }
         }
 

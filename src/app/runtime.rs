@@ -1,21 +1,21 @@
-//! [`Runtime`]: turns effects and requests into jobs on lanes, and their answers into commands.
+//! [`Runtime`]: turns effects and requests into jobs on workers, and their answers into commands.
 
 mod follow;
-mod lanes;
 mod perform;
+mod workers;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::{Duration, Instant};
 
-use lanes::{Event, Lanes};
+use workers::{Event, Workers};
 
 use super::answers::Answer;
 use super::apply::apply;
 use super::command::{Command, LabelsCommand, LibraryCommand, UnsavedCommand};
 use super::effect::Effect;
-use super::jobs::Lane;
+use super::jobs::Worker;
 use super::keys::{DatasetSeq, Preview, TouchKey};
 use super::results::preview::PreviewRequest;
 use super::services::Services;
@@ -59,7 +59,7 @@ pub(super) enum JobId {
 /// Runs what `apply` wants done and what the panes want to show.
 pub struct Runtime {
     services: Arc<Services>,
-    lanes: Lanes,
+    workers: Workers,
     events: Receiver<Event>,
     sender: Sender<Event>,
     /// Progress by ticket, only the latest.
@@ -91,10 +91,10 @@ impl Runtime {
 
     fn new(services: Arc<Services>, wake: Wake, threaded: bool) -> Self {
         let (sender, events) = channel();
-        let lanes = Lanes::new(threaded, &sender, &wake);
+        let workers = Workers::new(threaded, &sender, &wake);
         Self {
             services,
-            lanes,
+            workers,
             events,
             sender,
             progress: Arc::default(),
@@ -132,7 +132,7 @@ impl Runtime {
             }
             self.run(state, answer, &mut ui);
             // Only now: until its result is in the state, a request counts as running and is not started again.
-            self.lanes.forget(&id);
+            self.workers.forget(&id);
         }
         let progress = std::mem::take(&mut *lock(&self.progress));
         for (ticket, progress) in progress {
@@ -155,7 +155,7 @@ impl Runtime {
             self.run(state, Answer::Demanded(wanted), &mut ui);
         }
         let services = &self.services;
-        self.lanes.demand(&state.tasks.demanded, |request| {
+        self.workers.demand(&state.tasks.demanded, |request| {
             Some((state.library.open.as_ref()?.seq, results::job(request, state, services)?))
         });
         ui
@@ -186,7 +186,7 @@ impl Runtime {
     /// of their data set. Call [`Runtime::tick`] no more.
     pub fn finish(&mut self, state: &mut State) {
         self.follow(None);
-        self.lanes.close();
+        self.workers.close();
         let mut keep: Vec<Effect> = Vec::new();
         while let Ok(Event { answer, .. }) = self.events.try_recv() {
             keep.extend(apply(state, answer.into()).into_iter().filter(|e| matches!(e, Effect::KeepLabels { .. })));
@@ -207,24 +207,24 @@ impl Runtime {
         state.document.unsaved.clear();
     }
 
-    /// Runs the first waiting job of a lane here and now; `false` if none waits. Only without threads.
-    pub fn run_one(&mut self, lane: Lane) -> bool {
-        self.lanes.run_one(lane)
+    /// Runs the first waiting job of a worker here and now; `false` if none waits. Only without threads.
+    pub fn run_one(&mut self, worker: Worker) -> bool {
+        self.workers.run_one(worker)
     }
 
     /// Runs jobs here until nothing waits any more. Only without threads.
     pub fn settle(&mut self, state: &mut State) -> Vec<UiRequest> {
         use strum::IntoEnumIterator as _;
         let mut ui = self.tick(state, Vec::new());
-        while Lane::iter().any(|lane| self.lanes.run_one(lane)) {
+        while Worker::iter().any(|worker| self.workers.run_one(worker)) {
             ui.extend(self.tick(state, Vec::new()));
         }
         ui
     }
 
-    /// Jobs that wait on a lane.
-    pub fn waiting(&self, lane: Lane) -> usize {
-        self.lanes.waiting(lane)
+    /// Jobs that wait on a worker.
+    pub fn waiting(&self, worker: Worker) -> usize {
+        self.workers.waiting(worker)
     }
 
     fn run(&mut self, state: &mut State, command: impl Into<Command>, ui: &mut Vec<UiRequest>) {
@@ -243,7 +243,7 @@ impl Drop for Runtime {
             cancel.cancel();
         }
         self.follow(None);
-        self.lanes.close();
+        self.workers.close();
     }
 }
 

@@ -3,8 +3,8 @@
 use std::sync::{Arc, Mutex};
 
 use touch2touch::app::command::{Answer, LibraryCommand, Pane, PredictCommand, ViewCommand};
-use touch2touch::app::effect::Ended;
-use touch2touch::app::jobs::Lane;
+use touch2touch::app::effect::TaskResult;
+use touch2touch::app::jobs::Worker;
 use touch2touch::app::keys::Preview;
 use touch2touch::app::keys::{ImprintSource, PredictionKey, Preset, Sampler, Spacing};
 use touch2touch::app::predict::Generate;
@@ -77,7 +77,7 @@ fn the_pair_that_stays_on_screen_is_predicted_by_itself_where_that_costs_little(
     let slow = Prediction { seconds: 5.0, ..(**bench.state.results.predictions.get(&key).unwrap()).clone() };
     let keys: Vec<_> = bench.state.results.predictions.iter().map(|(key, _)| key.clone()).collect();
     let slow = keys.into_iter().map(|key| (key, Arc::new(slow.clone()))).collect();
-    bench.send(Answer::Ended(Ticket(u64::MAX), Ended::of::<Generate>(slow)));
+    bench.send(Answer::TaskResult(Ticket(u64::MAX), TaskResult::of::<Generate>(slow)));
     bench.send(panes(&[Pane::Predicted]));
     bench.settle();
     assert_eq!(bench.generated(), 2);
@@ -174,7 +174,7 @@ fn what_was_made_before_the_start_is_found_when_its_pair_is_looked_at() {
     again.send(LibraryCommand::Step(-1));
     again.settle();
     assert_eq!(again.state.results.looked_up.len(), looked + 1, "each touch is looked up once");
-    assert!(again.runtime.waiting(Lane::Files) == 0);
+    assert!(again.runtime.waiting(Worker::Files) == 0);
 }
 
 #[test]

@@ -35,13 +35,13 @@ fn nothing_is_recorded_unless_it_is_looked_at() {
     let mut bench = bench(&[Pane::Scene, Pane::Metrics]);
     let pose = results::pose(&bench.state, MEASURED).ready().unwrap().clone();
     assert!(pose.report.trace.is_empty() && pose.report.fits.is_empty());
-    assert!(bench.state.results.inspections.is_empty());
+    assert!(bench.state.results.runs.is_empty());
     assert!(Action::StepBack.command(&bench.state).is_none(), "there is nothing to step through");
     // The time machine alone records; it needs no pose beside.
     bench.state.results.estimates.clear();
     bench.send(panes(&[Pane::TimeMachine]));
     bench.settle();
-    assert_eq!(bench.state.results.inspections.len(), 1);
+    assert_eq!(bench.state.results.runs.len(), 1);
     assert!(results::pose(&bench.state, MEASURED).ready().is_none());
     let inspection = results::inspection(&bench.state).ready().unwrap().clone();
     assert_eq!(inspection.report().grasp_from_object, pose.grasp_from_object, "looking changes nothing");
@@ -94,7 +94,7 @@ fn stepping_goes_both_ways_and_stops_at_the_ends() {
     }
     assert!(!bench.state.inspect.playing && results::inspected(&bench.state).unwrap().is_last());
     // Scrubbing computed nothing.
-    assert_eq!(bench.state.results.inspections.len(), 1);
+    assert_eq!(bench.state.results.runs.len(), 1);
     // Another start; one that does not exist shows the last.
     send(&mut bench, InspectCommand::Run(usize::MAX));
     let shown = results::inspected(&bench.state).unwrap();

@@ -2,7 +2,7 @@
 
 use touch2touch::app::action::Action;
 use touch2touch::app::command::{Answer, Command, LabelsCommand, LibraryCommand, Pane, PredictCommand, ViewCommand};
-use touch2touch::app::jobs::Lane;
+use touch2touch::app::jobs::Worker;
 use touch2touch::app::keys::{ImprintSource, MaskVersion, Revision};
 use touch2touch::app::labels::{MaskPlace, Review};
 use touch2touch::app::results;
@@ -259,7 +259,7 @@ fn strokes_waiting_for_the_disk_become_one_and_survive_the_end() {
         stroke(&mut bench, lab::RIGHT, [20.0, y as f32 * 3.0], [21.0, y as f32 * 3.0]);
     }
     let drawn = mask(&bench, lab::RIGHT);
-    assert_eq!(bench.runtime.waiting(Lane::Files), 1);
+    assert_eq!(bench.runtime.waiting(Worker::Files), 1);
     let folders = bench.folders.clone();
     // The program ends before the disk had its turn: what waits to be written is written first.
     drop(bench);

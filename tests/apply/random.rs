@@ -39,7 +39,7 @@ fn said(doc: &Document) -> Said {
 fn stays(command: &Command) -> bool {
     match command {
         Command::Library(LibraryCommand::Open(_) | LibraryCommand::Reload) => false,
-        Command::Answer(Answer::Ended(_, end)) => !matches!(end.kind, TaskKind::Import | TaskKind::ReadOtherwise),
+        Command::Answer(Answer::TaskResult(_, end)) => !matches!(end.kind, TaskKind::Import | TaskKind::ReadOtherwise),
         _ => true,
     }
 }

@@ -76,7 +76,7 @@ impl Rig {
         Some(rig)
     }
 
-    /// As [`Rig::new`] on `pairs` pairs of one tool that are the same files, read on lanes of their own while frames go on.
+    /// As [`Rig::new`] on `pairs` pairs of one tool that are the same files, read on workers of their own while frames go on.
     pub(super) fn paging(size: [f32; 2], pairs: u64) -> Option<Self> {
         crate::support::gpu()?;
         let folder = tempfile::tempdir().unwrap();

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::super::effect::{Access, Effect, Errand};
+use super::super::effect::{Access, Effect, Task};
 use super::super::source::Source;
 use super::super::state::State;
 use super::super::state::tasks::{Level, TaskKind};
@@ -16,7 +16,7 @@ pub struct ImportMasks {
     pub(in crate::app) setup: ImportSetup,
 }
 
-impl Errand for ImportMasks {
+impl Task for ImportMasks {
     type End = Import;
     const KIND: TaskKind = TaskKind::Import;
 

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::super::effect::{Access, Effect, Errand};
+use super::super::effect::{Access, Effect, Task};
 use super::super::keys::{ImprintSource, ShiftMode};
 use super::super::source::Source;
 use super::super::state::State;
@@ -41,7 +41,7 @@ pub struct Refit {
     source: Arc<Source>,
 }
 
-impl Errand for Refit {
+impl Task for Refit {
     /// The statistics, and where they are kept.
     type End = (ShiftStatistics, Option<PathBuf>);
     const KIND: TaskKind = TaskKind::Refit;

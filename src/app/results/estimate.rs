@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::super::jobs::{Job, Lane};
+use super::super::jobs::{Job, Worker};
 use super::super::keys::{EstimateKey, ImprintKey, ImprintSource, MaskRecipe, MaskVersion, PairKey, ToolKey};
 use super::super::results::{Computes, Demands, gone};
 use super::super::services::Services;
@@ -16,6 +16,7 @@ use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::labels::{MaskPlace, PairLabels};
 use touch2touch_pipeline::steps::cloud::Clouds;
 use touch2touch_pipeline::steps::estimate::{Estimate, Touch};
+use touch2touch_pipeline::steps::mask::MaskChoice;
 use touch2touch_pipeline::steps::pose::PoseResult;
 use touch2touch_pipeline::steps::recipe::{Recipe, Stage};
 use touch2touch_pipeline::steps::tool::NamedTool;
@@ -23,7 +24,11 @@ use touch2touch_pipeline::steps::tool::NamedTool;
 impl Computes for EstimateKey {
     fn job(&self, state: &State, services: &Arc<Services>) -> Option<Job<Estimate>> {
         let (pair, side) = self.place()?;
-        let recipe = recipe::in_force(state, side);
+        let mut recipe = recipe::in_force(state, side);
+        if recipe.mask_recipe(&state.rig()).is_err() {
+            // The masks that there are were drawn.
+            recipe.mask = MaskChoice::default();
+        }
         let (begun, labels) = (begun(state, self, &recipe)?, drawn(state, self, &recipe)?);
         let tool = state.library.entry(pair.pair).and_then(|entry| entry.tool.as_deref());
         let tool = tool.map(|tool| ToolKey { dataset: pair.dataset, name: tool.into() });
@@ -34,14 +39,14 @@ impl Computes for EstimateKey {
         let asked = self.parts.entries().any(|(pad, (_, mask))| {
             matches!(mask, Some(MaskVersion::Auto(MaskRecipe::Unet(..)))) && !begun.has_probability(pad)
         });
-        let (lane, what) = match self.stage {
-            Stage::Prediction | Stage::Imprint => (Lane::Compute, "Prediction in meters"),
-            stage if begun.has(Stage::Mask) || !asked => (Lane::Compute, name(stage)),
-            stage => (Lane::Models, name(stage)),
+        let (worker, what) = match self.stage {
+            Stage::Prediction | Stage::Imprint => (Worker::Compute, "Prediction in meters"),
+            stage if begun.has(Stage::Mask) || !asked => (Worker::Compute, name(stage)),
+            stage => (Worker::Models, name(stage)),
         };
         let (source, stage, services) = (state.library.open.as_ref()?.source.clone(), self.stage, services.clone());
         let sample = state.results.samples.get(&pair)?.clone();
-        Some(Job::new(lane, what, move |cx| {
+        Some(Job::new(worker, what, move |cx| {
             let none = gone();
             let tool = tool.as_deref().map(|tool| &tool.model).ok_or(&none);
             let touch = Touch { dataset: &source.dataset, pair: pair.pair, sample: &sample, tool, labels: &labels };
@@ -232,8 +237,9 @@ pub fn pose_of<'a>(state: &'a State, key: &EstimateKey) -> Option<&'a PoseResult
 /// The inputs of a job about a pose: cloud, tool and pair.
 pub(crate) fn registered(state: &State, key: &EstimateKey) -> Option<(Arc<Estimate>, Arc<NamedTool>, Arc<Sample>)> {
     let (PairKey { dataset, .. }, (name, _)) = (key.place()?.0, key.pose.as_ref()?);
+    let estimates = &state.results.estimates;
     Some((
-        state.results.estimates.get(&key.its_cloud())?.clone(),
+        estimates.get(key).or_else(|| estimates.get(&key.its_cloud()))?.clone(),
         state.results.tools.get(&ToolKey { dataset, name: name.clone() })?.clone(),
         state.results.samples.get(&key.place()?.0)?.clone(),
     ))
@@ -260,13 +266,12 @@ pub(crate) fn want_side(
 fn want_cloud(wants: &mut Demands<'_>, source: ImprintSource, pose: bool) -> Option<EstimateKey> {
     let state = wants.state;
     results::want_tool(wants);
-    let tool = results::tool(state).ready().is_some();
-    let lacks_tool = !tool && matches!(recipe::automatic_mask(state), Ok(MaskRecipe::Cad(_)));
-    if !state.document.stored.contains_key(state.pair_name()) || lacks_tool {
+    if !state.document.stored.contains_key(state.pair_name()) || results::awaits_tool(state) {
         return None;
     }
     let cloud = cloud_key(state, source).ok()??;
-    let posed = pose_key(state, source).ok().flatten().filter(|_| pose && tool);
+    let posed = pose_key(state, source).ok().flatten();
+    let posed = posed.filter(|_| pose && results::tool(state).ready().is_some());
     let key = posed.unwrap_or(cloud);
     // A mask of it cannot be made: each finger says why.
     if state.failure(key.clone()).is_some() {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::super::jobs::{Job, Lane};
+use super::super::jobs::{Job, Worker};
 use super::super::keys::{ColorKey, EstimateKey, FlagsKey, ImprintKey, ImprintSource, PictureKey, TouchKey};
 use super::super::pane::Demand;
 use super::super::results::{self, Computes, Demands, gone};
@@ -18,7 +18,7 @@ use touch2touch_pipeline::steps::imprint::{self, flags_of};
 impl Computes for ColorKey {
     fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<RgbGrid>> {
         let prediction = state.results.predictions.get(&self.0)?.clone();
-        Some(Job::new(Lane::Compute, "Predicted color picture", move |_| {
+        Some(Job::new(Worker::Compute, "Predicted color picture", move |_| {
             imprint::color(&prediction, [0, 0])?.ok_or_else(gone)
         }))
     }
@@ -29,7 +29,7 @@ impl Computes for PictureKey {
         let pair = self.0.pair;
         let source = state.library.open.as_ref()?.source.clone();
         let sample = state.results.samples.get(&pair)?.clone();
-        Some(Job::new(Lane::Files, "Stored picture", move |_| {
+        Some(Job::new(Worker::Files, "Stored picture", move |_| {
             beside(&source.dataset, pair.pair, &sample)?.ok_or_else(|| {
                 let why = "no picture of another program's prediction lies beside this pair";
                 TaskError::new("Stored picture", why)
@@ -78,7 +78,7 @@ impl Computes for FlagsKey {
         let Self(recipe, shift) = self.clone();
         let prediction = state.results.predictions.get(&recipe)?.clone();
         let sample = state.results.samples.get(&recipe.touch.pair)?.clone();
-        Some(Job::new(Lane::Compute, "Depth chain", move |_| {
+        Some(Job::new(Worker::Compute, "Depth chain", move |_| {
             flags_of(&prediction, shift, &sample, recipe.touch.finger)
         }))
     }

@@ -140,6 +140,12 @@ pub(crate) fn automatic_provenance(
     recipe.provenance(state.library.mask_model(recipe), found.map_or(MaskBasis::Source, |found| found.basis))
 }
 
+/// True where automatic masks take the CAD model, which is still being read.
+pub(crate) fn awaits_tool(state: &State) -> bool {
+    let cad = matches!(recipe::automatic_mask(state), Ok(MaskRecipe::Cad(_)));
+    cad && matches!(results::tool(state), Lookup::Waiting)
+}
+
 pub(crate) fn want_mask(wants: &mut Demands<'_>, source: ImprintSource, finger: PadId) {
     let state = wants.state;
     // Stored corrections first: they may make the automatic mask unnecessary.
@@ -150,9 +156,8 @@ pub(crate) fn want_mask(wants: &mut Demands<'_>, source: ImprintSource, finger: 
         return;
     }
     let key = results::imprint_key(state, source, finger).and_then(|imprint| automatic(state, &imprint, finger));
-    let cad = matches!(mask_recipe(state, finger), Ok(MaskRecipe::Cad(_)));
     match key {
-        Ok(_) if cad && results::tool(state).ready().is_none() => results::want_tool(wants),
+        Ok(_) if awaits_tool(state) => results::want_tool(wants),
         Ok(key) => wants.ask(key),
         Err(_) => {}
     }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::super::jobs::{Job, Lane};
+use super::super::jobs::{Job, Worker};
 use super::super::keys::{AboutKey, ImportPlanKey, MaskPlanKey, Revision, TrainPlanKey};
 use super::super::pane::Demand;
 use super::super::results::{Computes, Demands};
@@ -21,7 +21,7 @@ impl Computes for MaskPlanKey {
     fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Plan>> {
         let source = state.library.open.as_ref()?.source.clone();
         let (changed, choice) = (state.document.finished_labels(), self.choice);
-        Some(Job::new(Lane::Files, "Plan of an export", move |_| {
+        Some(Job::new(Worker::Files, "Plan of an export", move |_| {
             let masks = DrawnMasks { labels: &Labels::of(&source.dataset), changed: &changed };
             plan_export(&source.dataset, &masks, &ExportSetup { pairs: None, choice })
         }))
@@ -50,7 +50,7 @@ impl Computes for ImportPlanKey {
     fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Import>> {
         let source = state.library.open.as_ref()?.source.clone();
         let setup = import_setup(state)?;
-        Some(Job::new(Lane::Files, "Plan of an import", move |cx| plan_import(&source.dataset, &setup, cx)))
+        Some(Job::new(Worker::Files, "Plan of an import", move |cx| plan_import(&source.dataset, &setup, cx)))
     }
 
     /// The form says it.
@@ -84,7 +84,7 @@ impl Computes for TrainPlanKey {
     fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<TrainPlan>> {
         let source = state.library.open.as_ref()?.source.clone();
         let (changed, choice) = (state.document.labels.clone(), self.choice);
-        Some(Job::new(Lane::Files, "Plan of a training", move |_| {
+        Some(Job::new(Worker::Files, "Plan of a training", move |_| {
             plan(&source.dataset, &DrawnMasks { labels: &Labels::of(&source.dataset), changed: &changed }, choice)
         }))
     }
@@ -120,7 +120,7 @@ impl Computes for AboutKey {
     fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Vec<Fact>>> {
         let source = state.library.open.as_ref()?.source.clone();
         let changed = state.document.labels.clone();
-        Some(Job::new(Lane::Compute, "About this data", move |_| {
+        Some(Job::new(Worker::Compute, "About this data", move |_| {
             Ok(facts(&source.dataset, &DrawnMasks { labels: &Labels::of(&source.dataset), changed: &changed }))
         }))
     }

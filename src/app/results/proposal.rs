@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::super::jobs::{Job, Lane};
+use super::super::jobs::{Job, Worker};
 use super::super::keys::{
     CadPlace, Distances, DistancesKey, EstimateKey, ImprintSource, MaskRecipe, MaskVersion, PairKey, ProposalInputs,
     ProposalKey, ToolKey,
@@ -45,7 +45,7 @@ impl Computes for DistancesKey {
         let tool = state.library.entry(touch.pair.pair)?.tool.as_deref()?;
         let tool = ToolKey { dataset: touch.pair.dataset, name: tool.into() };
         let tool = state.results.tools.get(&tool)?.clone();
-        Some(Job::new(Lane::Compute, "Distances to the CAD model", move |_| {
+        Some(Job::new(Worker::Compute, "Distances to the CAD model", move |_| {
             let on = OnPad { sample: &sample, pad: touch.finger };
             let grid = propose::cad_distances(&imprint, side, on, &tool.model, pose)?;
             Ok(Distances { grid, at })
@@ -57,7 +57,7 @@ impl Computes for ProposalKey {
     fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Proposal>> {
         let imprint = results::imprint_of(state, &self.imprint).ready()?.clone();
         let job = |make: Box<dyn FnOnce() -> Result<Proposal, TaskError> + Send>| {
-            Some(Job::new(Lane::Compute, WHAT, move |_| make()))
+            Some(Job::new(Worker::Compute, WHAT, move |_| make()))
         };
         match &self.of {
             ProposalInputs::Automatic(recipe) => {

@@ -4,10 +4,8 @@ use std::sync::Arc;
 
 use strum::IntoEnumIterator as _;
 
-use super::super::jobs::{Job, Lane};
-use super::super::keys::{
-    DeviationKey, ImprintSource, Inspection, InspectionKey, LayersKey, PoseBits, RankingKey, RunKey, ToolKey,
-};
+use super::super::jobs::{Job, Worker};
+use super::super::keys::{DeviationKey, ImprintSource, Inspection, LayersKey, PoseBits, RankingKey, RunKey, ToolKey};
 use super::super::results;
 use super::super::results::{Computes, Demands};
 use super::super::services::Services;
@@ -18,40 +16,30 @@ use touch2touch_core::which_tool::Candidate;
 use touch2touch_pipeline::compare::deviation::{self, Deviation};
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::steps::layers::{self, LayerResult};
-use touch2touch_pipeline::steps::pose::PoseResult;
 use touch2touch_pipeline::steps::tool::{NamedTool, named_tool, tool_file};
 
 impl Computes for RunKey {
-    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<PoseResult>> {
+    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Inspection>> {
         let ((estimate, tool, sample), by) = (results::registered(state, &self.pose)?, self.pose.pose.as_ref()?.1);
         let start = self.start.map(PoseBits::get);
-        Some(Job::new(Lane::Compute, "Registration, recorded", move |_| {
+        Some(Job::new(Worker::Compute, "Registration, recorded", move |_| {
             let ask = Ask { starts: start.as_ref().map(std::slice::from_ref), record: true, ..Ask::default() };
-            estimate.pose_by(&sample, &tool.model, &*by.method(), ask)
-        }))
-    }
-}
-
-/// The recorded registration from the registration's own starts; `None` while its inputs are not there.
-pub(crate) fn run_key(state: &State, source: ImprintSource) -> Option<RunKey> {
-    Some(RunKey { pose: results::pose_key(state, source).ok()??, start: None })
-}
-
-impl Computes for InspectionKey {
-    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Inspection>> {
-        let ((estimate, tool, _), by) = (results::registered(state, &self.0.pose)?, self.0.pose.pose.as_ref()?.1);
-        let run = state.results.runs.get(&self.0)?.clone();
-        Some(Job::new(Lane::Compute, "Steps of the registration", move |_| {
+            let run = estimate.pose_by(&sample, &tool.model, &*by.method(), ask)?;
             let points = estimate.points().map_err(Clone::clone)?.clone();
             Ok(Inspection::new(run, points, &tool.model, by))
         }))
     }
 
     fn arrived(&self, state: &mut State, _: &Arc<Inspection>) {
-        if let Some(at) = self.0.pose.place() {
+        if let Some(at) = self.pose.place() {
             state.results.latest.entry(at).or_default().inspection = Some(self.clone());
         }
     }
+}
+
+/// The recorded registration from the registration's own starts; `None` while its inputs are not there.
+pub(crate) fn run_key(state: &State, source: ImprintSource) -> Option<RunKey> {
+    Some(RunKey { pose: results::pose_key(state, source).ok()??, start: None })
 }
 
 /// The recipe of the recorded run that is looked at; `Ok(None)` while something it is made from is missing.
@@ -68,22 +56,15 @@ pub fn inspection(state: &State) -> Lookup<'_, Arc<Inspection>> {
     if let failed @ Lookup::Failed(_) = results::tool(state) {
         return failed.without();
     }
-    let before = || state.results.inspections.get(results::latest(state, state.inspect.source)?.inspection.as_ref()?);
-    let key = inspection_key(state);
-    let run = key.clone().ok().flatten().and_then(|run| state.failure(run));
-    state.look_or(key.map(|key| key.map(InspectionKey)), before).or_failed(run)
+    let before = || state.results.runs.get(results::latest(state, state.inspect.source)?.inspection.as_ref()?);
+    state.look_or(inspection_key(state), before)
 }
 
-/// The steps that are looked at, or the recorded registration that they are of.
+/// The recorded registration that is looked at.
 pub(crate) fn want_inspection(wants: &mut Demands<'_>) {
     let state = wants.state;
     if let (true, Ok(Some(run))) = (results::shows_steps(state, state.inspect.source), inspection_key(state)) {
-        let there = state.results.runs.contains(&run);
-        let key = InspectionKey(run.clone());
-        match there || state.results.inspections.contains(&key) {
-            true => wants.ask(key),
-            false => wants.ask(run),
-        }
+        wants.ask(run);
     }
 }
 
@@ -106,7 +87,7 @@ impl Computes for LayersKey {
     fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<LayerResult>> {
         let estimate = state.results.estimates.get(&self.0.its_cloud())?.clone();
         let run = state.results.runs.get(&self.run())?.clone();
-        Some(Job::new(Lane::Compute, "Layers of the registration", move |_| layers::layers(&estimate, &run)))
+        Some(Job::new(Worker::Compute, "Layers of the registration", move |_| layers::layers(&estimate, &run.result)))
     }
 }
 
@@ -132,7 +113,7 @@ impl Computes for DeviationKey {
     fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Deviation>> {
         let (estimate, tool, _) = results::registered(state, &self.0)?;
         let pose = results::pose_of(state, &self.0)?.grasp_from_object;
-        Some(Job::new(Lane::Compute, "Distances to the model", move |_| {
+        Some(Job::new(Worker::Compute, "Distances to the model", move |_| {
             Ok(deviation::deviation(estimate.surface(), &tool.model, pose))
         }))
     }
@@ -163,7 +144,7 @@ impl Computes for RankingKey {
             (name, state.results.tools.get(&key).cloned())
         };
         let tools: Vec<(String, Option<Arc<NamedTool>>)> = open.index().tools().into_iter().map(known).collect();
-        Some(Job::new(Lane::Compute, "Which tool", move |cx| {
+        Some(Job::new(Worker::Compute, "Which tool", move |cx| {
             let mut models = Vec::with_capacity(tools.len());
             for (name, known) in tools {
                 if cx.cancel.is_cancelled() {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::super::jobs::{Job, Lane};
+use super::super::jobs::{Job, Worker};
 use super::super::keys::{AmbiguityKey, PairKey, ThumbnailKey, TouchKey};
 use super::super::pane::Demand;
 use super::super::results::{self, Computes, Demands};
@@ -21,7 +21,7 @@ impl Computes for PairKey {
     fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Sample>> {
         let (source, pair) = (state.library.open.as_ref()?.source.clone(), self.pair);
         let what = format!("Load {}", state.library.entry(pair)?.name);
-        Some(Job::new(Lane::Files, what, move |_| source.load(pair)))
+        Some(Job::new(Worker::Files, what, move |_| source.load(pair)))
     }
 
     fn failed(&self, state: &mut State, _: &TaskError) -> bool {
@@ -70,7 +70,7 @@ impl Computes for ThumbnailKey {
         let (source, pair) = (state.library.open.as_ref()?.source.clone(), self.0.pair);
         let loaded = state.results.samples.get(&self.0).cloned();
         let what = format!("Picture of {}", state.library.entry(pair)?.name);
-        Some(Job::new(Lane::Files, what, move |_| match loaded {
+        Some(Job::new(Worker::Files, what, move |_| match loaded {
             Some(sample) => Ok(imprint::thumbnail(&sample)),
             None => Ok(imprint::thumbnail(&source.load(pair)?)),
         }))
@@ -99,7 +99,7 @@ pub(crate) fn want_thumbnails(wants: &mut Demands<'_>) {
 impl Computes for AmbiguityKey {
     fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Self::Value>> {
         let (sample, finger) = (state.results.samples.get(&self.0.pair)?.clone(), self.0.finger);
-        Some(Job::new(Lane::Compute, "What the GelSlim image leaves open", move |_| {
+        Some(Job::new(Worker::Compute, "What the GelSlim image leaves open", move |_| {
             let gelslim = sample.pad(finger).and_then(|t| t.color());
             Ok(touch2touch_core::ambiguity::ambiguity(&gelslim.ok_or_else(gone)?.difference))
         }))

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::super::jobs::{Job, Lane};
+use super::super::jobs::{Job, Worker};
 use super::super::keys::ToolKey;
 use super::super::results::{Computes, Demands};
 use super::super::services::Services;
@@ -14,7 +14,7 @@ impl Computes for ToolKey {
     fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<NamedTool>> {
         let (source, name) = (state.library.open.as_ref()?.source.clone(), self.name.clone());
         let what = format!("CAD model of {name}");
-        Some(Job::new(Lane::Compute, what, move |_| named_tool(&name, tool_file(&source.dataset, &name)?.mesh)))
+        Some(Job::new(Worker::Compute, what, move |_| named_tool(&name, tool_file(&source.dataset, &name)?.mesh)))
     }
 
     fn failed(&self, _: &mut State, _: &TaskError) -> bool {

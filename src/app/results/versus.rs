@@ -3,10 +3,10 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use super::super::jobs::{Job, Lane};
+use super::super::jobs::{Job, Worker};
 use super::super::keys::{
-    CloudDifferenceKey, ComparedKey, EstimateKey, ImprintKey, ImprintSource, MaskRecipe, MeanKey, PictureKey,
-    PredictionKey, ShiftMode, TouchKey, VersusKey,
+    CloudDifferenceKey, EstimateKey, ImprintKey, ImprintSource, MeanKey, PictureKey, PredictionKey, ShiftMode,
+    TouchKey, VersusKey,
 };
 use super::super::pane::Demand;
 use super::super::results::{Computes, Demands};
@@ -32,18 +32,7 @@ impl Computes for MeanKey {
             results::imprint_of(state, &ImprintKey::Predicted(made.clone(), self.shift)).ready().cloned()
         };
         let imprints: Vec<DepthMap> = self.recipes.iter().map(meters).collect::<Option<_>>()?;
-        Some(Job::new(Lane::Compute, "Mean of the seeds", move |_| mean(&imprints.iter().collect::<Vec<_>>())))
-    }
-}
-
-impl Computes for ComparedKey {
-    fn job(&self, state: &State, services: &Arc<Services>) -> Option<Job<Prediction>> {
-        self.0.job(state, services)
-    }
-
-    /// It does not push away what is looked at.
-    fn arrived(&self, state: &mut State, made: &Arc<Prediction>) {
-        results::keep_prediction(state, self.0.clone(), made.clone(), false);
+        Some(Job::new(Worker::Compute, "Mean of the seeds", move |_| mean(&imprints.iter().collect::<Vec<_>>())))
     }
 }
 
@@ -97,7 +86,7 @@ impl Computes for VersusKey {
             ImprintKey::Measured(_) => "Compare prediction and measurement",
             _ => "Compare A and B",
         };
-        Some(Job::new(Lane::Compute, what, move |_| {
+        Some(Job::new(Worker::Compute, what, move |_| {
             let tile = tile_of(&source.dataset, touch.pair.pair, &sample)?;
             let [a, b] = parts.each_ref().map(|part| part.depicted(&sample, touch.finger, tile.as_ref()));
             between(&a?, &b?, &sample, touch.finger)
@@ -109,7 +98,7 @@ impl Computes for CloudDifferenceKey {
     fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<CloudDifference>> {
         let cloud = |key: &EstimateKey| state.results.estimates.get(key).cloned();
         let (a, b) = (cloud(&self.a)?, cloud(&self.b)?);
-        Some(Job::new(Lane::Compute, "Distances between clouds", move |_| Ok(cloud_difference(&a, &b))))
+        Some(Job::new(Worker::Compute, "Distances between clouds", move |_| Ok(cloud_difference(&a, &b))))
     }
 }
 
@@ -182,7 +171,7 @@ pub fn subject<'a>(state: &'a State, subject: &Subject, finger: PadId) -> Lookup
                 return Lookup::Absent(Absent::NoInput);
             }
             let made = made_for(state, subject, touch).map(|(recipes, _)| recipes).unwrap_or_default();
-            made.into_iter().find_map(|recipe| state.failure(ComparedKey(recipe)))
+            made.into_iter().find_map(|recipe| state.failure(recipe))
         }
         _ => None,
     };
@@ -325,7 +314,7 @@ pub(crate) fn want_subject(wants: &mut Demands<'_>, subject: &Subject, finger: P
                     wants.ask(meters);
                 } else {
                     whole = false;
-                    wants.ask_unless(state.tasks.generating(&recipe).is_some(), ComparedKey(recipe));
+                    wants.ask_unless(state.tasks.generating(&recipe).is_some(), recipe);
                 }
             }
             if let ImprintKey::Mean(key) = key
@@ -345,8 +334,8 @@ pub(crate) fn want_subject_place(wants: &mut Demands<'_>, subject: &Subject) {
         return results::want_side(wants, side, [true, true], |_| true);
     }
     results::want_tool(wants);
-    let tool = results::tool(state).ready().is_some();
-    if tool || !matches!(recipe::automatic_mask(state), Ok(MaskRecipe::Cad(_))) {
+    if !results::awaits_tool(state) {
+        let tool = results::tool(state).ready().is_some();
         let key = if tool { subject_pose_key(state, subject) } else { subject_cloud(state, subject) };
         key.into_iter().for_each(|key| wants.ask(key));
     }

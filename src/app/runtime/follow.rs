@@ -7,7 +7,7 @@ use std::sync::mpsc::Sender;
 use super::super::answers::Answer;
 use super::super::keys::DatasetSeq;
 use super::super::source::{Followed, Source};
-use super::lanes::Event;
+use super::workers::Event;
 use super::{JobId, Runtime, Wake};
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::follow::{FollowEvent, Following};

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use super::super::keys::dataset::Read;
 use super::super::keys::{
-    Distances, EstimateKey, ImprintSource, Inspection, InspectionKey, Keyed, PairKey, PredictionKey, Preview, TouchKey,
+    Distances, EstimateKey, ImprintSource, Inspection, Keyed, PairKey, PredictionKey, Preview, RunKey, TouchKey,
 };
 use super::cache::Cache;
 use super::shown::Shown;
@@ -26,7 +26,6 @@ use touch2touch_pipeline::learn::train::TrainPlan;
 use touch2touch_pipeline::masks::propose::Proposal;
 use touch2touch_pipeline::steps::estimate::Estimate;
 use touch2touch_pipeline::steps::layers::LayerResult;
-use touch2touch_pipeline::steps::pose::PoseResult;
 use touch2touch_pipeline::steps::prediction::Prediction;
 use touch2touch_pipeline::steps::tool::NamedTool;
 
@@ -46,18 +45,14 @@ macro_rules! table {
         Tool(ToolKey => NamedTool, tool_bytes) in tools, 128 * MIB;
         /// The predictions of a touch that lie on the disk from before.
         Stored(StoredKey => Keyed);
-        /// Raw predictions. One is asked for because a pane needs it beside that of the other finger.
+        /// Raw predictions: of the pair on screen, of its other finger, of what is compared.
         Prediction(PredictionKey => Prediction, |made| made.raw.channels.iter().map(|c| c.len() * 4).sum()) in predictions, 256 * MIB;
-        /// A prediction of the pair on screen that nobody asked for: kept with the others.
-        Prefetch(PrefetchKey => Prediction);
         /// The mean of several predictions of one touch.
         Mean(MeanKey => DepthMap, |mean| mean.len() * 4) in means, 16 * MIB;
         /// A prediction of a color sensor: differences, 0..255 scale.
         Color(ColorKey => RgbGrid, |picture| picture.len() * 12) in colors, 32 * MIB;
         /// The prediction of another program that lies beside a pair as a picture.
         Picture(PictureKey => Beside, |found| 4 * (found.tile.len() + found.imprint.len())) in pictures, 16 * MIB;
-        /// A prediction that is compared with something: kept with the others.
-        Compared(ComparedKey => Prediction);
         /// Any two imprints of a touch against each other.
         Versus(VersusKey => Comparison, |found| found.error.len() * 4) in versus, 64 * MIB;
         /// The distances of the points of one cloud from another.
@@ -78,16 +73,14 @@ macro_rules! table {
         TrainPlan(TrainPlanKey => TrainPlan, |plan| (plan.masks() + plan.held_out[0]) * 256) in train_plans, MIB;
         /// An estimate: imprints, masks, cloud and pose as far as a pane needs them.
         Estimate(EstimateKey => Estimate, Estimate::bytes) in estimates, 259 * MIB;
-        /// A registration with everything recorded.
-        Run(RunKey => PoseResult, PoseResult::bytes) in runs, 32 * MIB;
+        /// A registration with everything recorded, ready to be looked through.
+        Run(RunKey => Inspection, Inspection::bytes) in runs, 96 * MIB;
         /// Reasons, residuals and distances of a recorded registration from the registration's own starts.
         Layers(LayersKey => LayerResult, LayerResult::bytes) in layers, 16 * MIB;
         /// Signed distances between contact points and the registered model.
         Deviation(DeviationKey => Deviation, Deviation::bytes) in deviations, 63 * MIB;
         /// All tools of the data set, ranked for the touch of a pose.
         Ranking(RankingKey => Vec<Candidate>, |found| found.len() * size_of::<Candidate>()) in rankings, MIB;
-        /// The steps of a recorded registration, made ready to be looked through.
-        Inspection(InspectionKey => Inspection, Inspection::bytes) in inspections, 64 * MIB;
         /// A small picture of a pair's measured imprint (right finger, else left).
         Thumbnail(ThumbnailKey => DepthMap, |picture| picture.len() * 4) in thumbnails, 32 * MIB;
         }
@@ -121,7 +114,7 @@ pub struct Latest {
     /// The pose.
     pub pose: Option<EstimateKey>,
     /// The recorded registration.
-    pub inspection: Option<InspectionKey>,
+    pub inspection: Option<RunKey>,
 }
 
 macro_rules! results {

@@ -51,7 +51,7 @@ pub struct Options {
     pub services: Arc<Services>,
     /// Path to open; `None` opens what was open last, else the demo.
     pub open: Option<PathBuf>,
-    /// Jobs run between frames on the window's own thread, one per frame, instead of on lanes of their own: the same
+    /// Jobs run between frames on the window's own thread, one per frame, instead of on workers of their own: the same
     /// input then gives the same frames (tests).
     pub inline: bool,
     /// True where the system's file dialogs are tried before the path box.
@@ -255,7 +255,7 @@ impl StudioApp {
             self.panes.memories.browser.scrolled_to = None;
         }
         if self.inline {
-            let more = crate::app::jobs::Lane::iter().any(|lane| self.runtime.run_one(lane));
+            let more = crate::app::jobs::Worker::iter().any(|worker| self.runtime.run_one(worker));
             if more {
                 ctx.request_repaint();
             }

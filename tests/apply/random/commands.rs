@@ -14,7 +14,7 @@ use touch2touch::app::command::{
     UnsavedCommand, ViewCommand, WorkbenchCommand,
 };
 use touch2touch::app::doctor::{Examine, ReadOtherwise, TryModels};
-use touch2touch::app::effect::{Ended, LabelsToSave, NotSaved};
+use touch2touch::app::effect::{LabelsToSave, NotSaved, TaskResult};
 use touch2touch::app::evaluate::{Score, ScoreChoice};
 use touch2touch::app::export::{Output, StillAsked};
 use touch2touch::app::keys::{AmbiguityKey, Preview};
@@ -313,30 +313,32 @@ fn followed() -> Followed {
     }
 }
 
-/// The end of an errand of any kind, as empty as it can be. A kind that has none does not compile.
-fn ended() -> impl Strategy<Value = Ended> {
+/// The end of a task of any kind, as empty as it can be. A kind that has none does not compile.
+fn ended() -> impl Strategy<Value = TaskResult> {
     (any_of::<TaskKind>(), select(vec!["tool_a/data_0", "elsewhere"]), select(vec![DatasetSeq(1), NEVER])).prop_map(
         |(kind, name, seq)| match kind {
-            TaskKind::Open => Ended::of::<Open>((NEVER, Place::Path(name.into()), demo())),
+            TaskKind::Open => TaskResult::of::<Open>((NEVER, Place::Path(name.into()), demo())),
             TaskKind::ReadTool => {
                 let (tool, word, file) = ("tool_a".into(), "mm".into(), "unit.txt".into());
                 let set = UnitSet { tool, unit: ToolUnit::Millimeters, file, word, not_written: None };
-                Ended::of::<ReadTool>((seq, set))
+                TaskResult::of::<ReadTool>((seq, set))
             }
-            TaskKind::Generate => Ended::of::<Generate>(Vec::new()),
-            TaskKind::Refit => Ended::of::<Refit>((statistics(), None)),
-            TaskKind::Write => Ended::of::<Write>(("Something".into(), "/dev/null/folder".into())),
+            TaskKind::Generate => TaskResult::of::<Generate>(Vec::new()),
+            TaskKind::Refit => TaskResult::of::<Refit>((statistics(), None)),
+            TaskKind::Write => TaskResult::of::<Write>(("Something".into(), "/dev/null/folder".into())),
             TaskKind::Import => {
-                Ended::of::<ImportMasks>(Import { new: 1, changed: vec![name.to_owned()], ..Import::default() })
+                TaskResult::of::<ImportMasks>(Import { new: 1, changed: vec![name.to_owned()], ..Import::default() })
             }
-            TaskKind::Evaluate => Ended::of::<Score>(Arc::new(evaluation())),
-            TaskKind::TryModels => Ended::of::<TryModels>(Some(Arc::new(Worth::default()))),
-            TaskKind::Examine => Ended::of::<Examine>(Arc::new(Examined::default())),
-            TaskKind::ReadOtherwise => Ended::of::<ReadOtherwise>((seq, "read-as.txt".into(), "swap-fingers".into())),
-            TaskKind::Learn if seq.0 % 2 == 0 => Ended::of::<Learn>(Learned::Generator(Arc::new(adapted()), None)),
+            TaskKind::Evaluate => TaskResult::of::<Score>(Arc::new(evaluation())),
+            TaskKind::TryModels => TaskResult::of::<TryModels>(Some(Arc::new(Worth::default()))),
+            TaskKind::Examine => TaskResult::of::<Examine>(Arc::new(Examined::default())),
+            TaskKind::ReadOtherwise => {
+                TaskResult::of::<ReadOtherwise>((seq, "read-as.txt".into(), "swap-fingers".into()))
+            }
+            TaskKind::Learn if seq.0 % 2 == 0 => TaskResult::of::<Learn>(Learned::Generator(Arc::new(adapted()), None)),
             TaskKind::Learn => {
                 let bundle = models().remove(1);
-                Ended::of::<Learn>(Learned::Masks(Arc::new(trained()), bundle))
+                TaskResult::of::<Learn>(Learned::Masks(Arc::new(trained()), bundle))
             }
         },
     )
@@ -538,7 +540,7 @@ draws! {
             Arc::new(Preview { recipe, picture: PreviewPicture { step: 1, of: 2, depth: DepthMap::filled(2, 2, 0.0) } })
         })),
         1 Progressed(ticket(), Just(Progress { done: 3, total: 4, text: "step".into(), ..Progress::default() })),
-        12 Ended(ticket(), ended()),
+        12 TaskResult(ticket(), ended()),
         1 Revealed,
         1 TaskFailed(ticket(), error()),
         1 RequestFailed(select(vec![DatasetSeq(1), NEVER]), touch().prop_map(|t| Box::new(Request::Sample(t.pair))), error()),
