@@ -25,6 +25,9 @@ impl Computes for EstimateKey {
     fn job(&self, state: &State, services: &Arc<Services>) -> Option<Job<Estimate>> {
         let (pair, side) = self.place()?;
         let mut recipe = recipe::in_force(state, side);
+        if let Some((ImprintKey::Predicted(_, shift), _)) = self.parts.iter().flatten().next() {
+            recipe.shift = *shift;
+        }
         if recipe.mask_recipe(&state.rig()).is_err() {
             // The masks that there are were drawn.
             recipe.mask = MaskChoice::default();
@@ -103,10 +106,10 @@ fn begun(state: &State, key: &EstimateKey, recipe: &Recipe) -> Option<Estimate> 
         return Some(cloud.again(&Recipe { registration: *registration, ..cloud.recipe().clone() }));
     }
     if key.stage == Stage::Imprint {
-        let (ImprintKey::Predicted(made, shift), _) = key.parts.iter().flatten().next()? else { return None };
+        let (ImprintKey::Predicted(made, _), _) = key.parts.iter().flatten().next()? else { return None };
         let mut predictions = PerPad::default();
         predictions[made.touch.finger] = Some((**state.results.predictions.get(made)?).clone());
-        return Some(Estimate::of_predictions(&Recipe { shift: *shift, ..recipe.clone() }, predictions));
+        return Some(Estimate::of_predictions(recipe, predictions));
     }
     let (mut imprints, mut unmasked) = (PerPad::default(), Vec::new());
     for (pad, (imprint, mask)) in key.parts.entries() {
@@ -116,7 +119,7 @@ fn begun(state: &State, key: &EstimateKey, recipe: &Recipe) -> Option<Estimate> 
     let mut begun = Estimate::with_imprints(recipe, imprints).without_masks(unmasked);
     for (pad, (imprint, _)) in key.parts.entries() {
         if let Some(other) = known.get(&EstimateKey::imprint(imprint)) {
-            begun.take_probability(pad, other);
+            begun.take_over(pad, other);
         }
     }
     Some(begun)

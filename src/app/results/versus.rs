@@ -1,6 +1,5 @@
 //! Any two imprints of a touch against each other: what each side is, their figures, clouds and poses.
 
-use std::borrow::Cow;
 use std::sync::Arc;
 
 use super::super::jobs::{Job, Worker};
@@ -9,22 +8,21 @@ use super::super::keys::{
     TouchKey, VersusKey,
 };
 use super::super::pane::Demand;
-use super::super::results::{Computes, Demands};
+use super::super::results::{Computes, Demands, gone};
 use super::super::services::Services;
 use super::super::state::settings::versus::{Versus, VersusMode};
 use super::super::state::{Absent, Lookup, State};
 use super::super::{recipe, results};
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::rig::{PadId, PerPad};
-use touch2touch_core::sample::Sample;
-use touch2touch_pipeline::compare::depict::mean;
+use touch2touch_pipeline::compare::depict::{SubjectImprints, mean};
 use touch2touch_pipeline::compare::deviation::{CloudDifference, cloud_difference};
 use touch2touch_pipeline::compare::subject::{MadeFrom, RecipeChange, Subject};
-use touch2touch_pipeline::compare::{Beside, Comparison, Depicted, between, tile_of};
-use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::compare::{Comparison, between, tile_of};
 use touch2touch_pipeline::steps::cloud::Clouds;
+use touch2touch_pipeline::steps::estimate::Estimate;
 use touch2touch_pipeline::steps::pose::PoseResult;
-use touch2touch_pipeline::steps::prediction::Prediction;
+use touch2touch_pipeline::steps::recipe::Recipe;
 
 impl Computes for MeanKey {
     fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<DepthMap>> {
@@ -36,60 +34,40 @@ impl Computes for MeanKey {
     }
 }
 
-/// An imprint with what is known of its picture, as an input of a job.
-struct Part {
-    of: ImprintKey,
-    imprint: DepthMap,
-    drawn: Option<(Arc<Prediction>, ShiftMode)>,
-    beside: Option<Arc<Beside>>,
-}
-
-impl Part {
-    fn of(of: &ImprintKey, state: &State) -> Option<Self> {
-        let (mut drawn, mut beside) = (None, None);
-        match of {
-            ImprintKey::Predicted(recipe, shift) => {
-                drawn = Some((state.results.predictions.get(recipe)?.clone(), *shift));
-            }
-            ImprintKey::Picture(touch) => beside = Some(state.results.pictures.get(&PictureKey(*touch))?.clone()),
-            ImprintKey::Measured(_) | ImprintKey::Mean(_) => {}
+/// One side of a comparison, as the verb has it; `None` if something of it is not there.
+fn imprints(state: &State, of: &ImprintKey) -> Option<SubjectImprints> {
+    let estimate = match state.results.estimates.get(&EstimateKey::imprint(of)) {
+        Some(known) => (**known).clone(),
+        None => {
+            let mut imprints = PerPad::default();
+            imprints[of.touch().finger] = Some(results::imprint_of(state, of).ready()?.clone());
+            Estimate::with_imprints(&Recipe::default(), imprints)
         }
-        let imprint = results::imprint_of(state, of).ready()?.clone();
-        Some(Self { of: of.clone(), imprint, drawn, beside })
-    }
-
-    fn depicted<'a>(
-        &'a self,
-        sample: &Sample,
-        pad: PadId,
-        tile: Option<&'a DepthMap>,
-    ) -> Result<Depicted<'a>, TaskError> {
-        let own = match (&self.of, &self.beside) {
-            (ImprintKey::Measured(_), _) => tile,
-            (_, Some(found)) => Some(&found.tile),
-            _ => {
-                let drawn = self.drawn.as_ref().map(|(prediction, shift)| (&**prediction, *shift));
-                return Depicted::predicted(&self.imprint, drawn, sample, pad, tile);
-            }
-        };
-        Ok(Depicted { imprint: &self.imprint, tile: own.map(Cow::Borrowed) })
-    }
+    };
+    let tile = match of {
+        ImprintKey::Picture(touch) => Some(state.results.pictures.get(&PictureKey(*touch))?.tile.clone()),
+        _ => None,
+    };
+    Some(SubjectImprints { estimate, tile })
 }
 
 impl Computes for VersusKey {
     fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Comparison>> {
-        let touch = self.a.touch();
-        let parts = [Part::of(&self.a, state)?, Part::of(&self.b, state)?];
+        let (touch, key) = (self.a.touch(), self.clone());
+        let (mut a, mut b) = (imprints(state, &self.a)?, imprints(state, &self.b)?);
         let sample = state.results.samples.get(&touch.pair)?.clone();
         let source = state.library.open.as_ref()?.source.clone();
-        let what = match self.b {
-            ImprintKey::Measured(_) => "Compare prediction and measurement",
-            _ => "Compare A and B",
-        };
-        Some(Job::new(Worker::Compute, what, move |_| {
+        Some(Job::new(Worker::Compute, "Compare A and B", move |_| {
             let tile = tile_of(&source.dataset, touch.pair.pair, &sample)?;
-            let [a, b] = parts.each_ref().map(|part| part.depicted(&sample, touch.finger, tile.as_ref()));
-            between(&a?, &b?, &sample, touch.finger)
+            for (side, of) in [(&mut a, &key.a), (&mut b, &key.b)] {
+                if matches!(of, ImprintKey::Measured(_)) {
+                    side.tile.clone_from(&tile);
+                }
+            }
+            let finger = touch.finger;
+            let a = a.of_pad(&sample, finger, tile.as_ref())?.ok_or_else(gone)?;
+            let b = b.of_pad(&sample, finger, tile.as_ref())?.ok_or_else(gone)?;
+            between(&a, &b, &sample, finger)
         }))
     }
 }

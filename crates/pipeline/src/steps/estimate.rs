@@ -116,8 +116,12 @@ impl Estimate {
         Self { unmasked, ..self }
     }
 
-    /// Takes over what the mask model said of the imprint of a pad, which is the same as another estimate's.
-    pub fn take_probability(&mut self, pad: PadId, other: &Self) {
+    /// Takes over what another estimate knows of the imprint of a pad, which is the same: its prediction, and what the mask
+    /// model said of it.
+    pub fn take_over(&mut self, pad: PadId, other: &Self) {
+        if let Some(made) = &other.predictions[pad] {
+            Arc::make_mut(&mut self.predictions)[pad] = Some(made.clone());
+        }
         if self.recipe.mask_model == other.recipe.mask_model && self.recipe.engine == other.recipe.engine {
             self.probabilities[pad].clone_from(&other.probabilities[pad]);
         }
