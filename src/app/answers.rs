@@ -38,8 +38,8 @@ pub enum Answer {
     Progressed(Ticket, Progress),
     /// A task is done.
     TaskResult(Ticket, TaskResult),
-    /// The system was asked to show a place.
-    Revealed,
+    /// Something is done of which nothing follows.
+    Done,
     /// It ended without a result.
     TaskFailed(Ticket, TaskError),
     /// A result that a pane asked for could not be made.
@@ -50,8 +50,6 @@ pub enum Answer {
     LabelsFailed(Box<NotSaved>),
     /// Labels are in another folder, as they were when that was asked for.
     LabelsKept(Vec<(String, Revision)>, PathBuf),
-    /// The settings are on the disk.
-    SettingsSaved,
     /// A job failed that is neither of a ticket nor of a request.
     JobFailed(TaskError),
 }
@@ -103,11 +101,7 @@ pub(super) fn step(state: &mut State, answer: Answer, effects: &mut Vec<Effect>)
         Answer::LabelsKept(revisions, folder) => labels::unsaved::kept(state, revisions, folder, effects),
         Answer::JobFailed(err) => state.log.error(&err),
         // What came too late, or needs nothing.
-        Answer::Computed(..)
-        | Answer::RequestFailed(..)
-        | Answer::Previewed(..)
-        | Answer::SettingsSaved
-        | Answer::Revealed => {}
+        Answer::Computed(..) | Answer::RequestFailed(..) | Answer::Previewed(..) | Answer::Done => {}
     }
 }
 

@@ -42,10 +42,12 @@ impl Computes for EstimateKey {
         let asked = self.parts.entries().any(|(pad, (_, mask))| {
             matches!(mask, Some(MaskVersion::Auto(MaskRecipe::Unet(..)))) && !begun.has_probability(pad)
         });
-        let (worker, what) = match self.stage {
-            Stage::Prediction | Stage::Imprint => (Worker::Compute, "Prediction in meters"),
-            stage if begun.has(Stage::Mask) || !asked => (Worker::Compute, name(stage)),
-            stage => (Worker::Models, name(stage)),
+        let worker = if asked && !begun.has(Stage::Mask) { Worker::Models } else { Worker::Compute };
+        let what = match self.stage {
+            Stage::Prediction | Stage::Imprint => "Prediction in meters",
+            Stage::Mask => "Contact mask",
+            Stage::Cloud => "Point cloud",
+            Stage::Pose => "Pose",
         };
         let (source, stage, services) = (state.library.open.as_ref()?.source.clone(), self.stage, services.clone());
         let sample = state.results.samples.get(&pair)?.clone();
@@ -77,14 +79,6 @@ impl Computes for EstimateKey {
                 note(state, imprint, mask.as_ref(), made);
             }
         }
-    }
-}
-
-fn name(stage: Stage) -> &'static str {
-    match stage {
-        Stage::Prediction | Stage::Imprint | Stage::Mask => "Contact mask",
-        Stage::Cloud => "Point cloud",
-        Stage::Pose => "Pose",
     }
 }
 

@@ -41,7 +41,7 @@ impl Runtime {
                 let services = self.services.clone();
                 self.unwatched(Worker::Files, JobId::SaveSettings, "Save the preferences", move |_| {
                     services.save_settings(&settings)?;
-                    Ok(Answer::SettingsSaved)
+                    Ok(Answer::Done)
                 });
             }
             Effect::Reveal(place) => {
@@ -129,5 +129,5 @@ fn reveal(place: &Path) -> Result<Answer, TaskError> {
     folders::reveal(place).map_err(|err| {
         TaskError::new("Show the folder", format!("{err} ({})", place.display())).with_hint("Copy the path instead.")
     })?;
-    Ok(Answer::Revealed)
+    Ok(Answer::Done)
 }

@@ -279,10 +279,10 @@ mod tests {
             workers.submit(Worker::Files, Job { id, what, cx: JobCx::unwatched(), body, failed });
         };
         submit(JobId::Bundles, Box::new(|_| panic!("the file bit back")));
-        submit(JobId::Reveal, Box::new(|_| Ok(Answer::Revealed)));
+        submit(JobId::Reveal, Box::new(|_| Ok(Answer::Done)));
         assert!(workers.run_one(Worker::Files) && workers.run_one(Worker::Files) && !workers.run_one(Worker::Files));
         let answers: Vec<Answer> = events.try_iter().map(|event| event.answer).collect();
-        let [Answer::JobFailed(err), Answer::Revealed] = &answers[..] else { panic!("{answers:?}") };
+        let [Answer::JobFailed(err), Answer::Done] = &answers[..] else { panic!("{answers:?}") };
         assert!(err.kind == TaskErrorKind::Panicked && err.why.contains("the file bit back"), "{err}");
     }
 }

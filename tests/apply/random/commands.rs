@@ -541,13 +541,12 @@ draws! {
         })),
         1 Progressed(ticket(), Just(Progress { done: 3, total: 4, text: "step".into(), ..Progress::default() })),
         12 TaskResult(ticket(), ended()),
-        1 Revealed,
+        1 Done,
         1 TaskFailed(ticket(), error()),
         1 RequestFailed(select(vec![DatasetSeq(1), NEVER]), touch().prop_map(|t| Box::new(Request::Sample(t.pair))), error()),
         1 LabelsSaved(Just("tool_a/data_0".to_owned()), Just(Revision(u64::MAX)), Just(None)),
         1 LabelsFailed(select(vec![DatasetSeq(1), NEVER]).prop_map(not_saved)),
         1 LabelsKept(select(vec![Vec::new(), vec![("tool_a/data_0".to_owned(), Revision(1))]]), Just(PathBuf::from("elsewhere"))),
-        1 SettingsSaved,
         1 JobFailed(error()),
     }
 }
