@@ -26,8 +26,7 @@ use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::learn::{AdaptPairs, LearnForm};
 use touch2touch::app::library::Place;
 use touch2touch::app::runtime::Runtime;
-use touch2touch::app::services::Services as _;
-use touch2touch::app::services::live::LiveServices;
+use touch2touch::app::services::Services;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{CompareChoice, CompareMode, MaskChoice, MaskSettings, MaskSource, MaskTool};
 use touch2touch::app::state::{Lookup, State};
@@ -86,7 +85,7 @@ struct Studio {
 
 impl Studio {
     fn open(place: Place, home: &Path) -> Self {
-        let services = LiveServices::with_config_folder(Some(home.to_owned()));
+        let services = Services::with_config_folder(Some(home.to_owned()));
         let mut settings = services.load_settings().0;
         settings.generate.by_itself = false;
         settings.about_own_data = false;
@@ -148,7 +147,7 @@ fn assert_same(place: Place, path: &str, home: &Path, pairs: usize) -> BTreeMap<
     let generated = json(&generate, home);
     let mut studio = Studio::open(place, home);
     let mut compared: BTreeMap<String, usize> = BTreeMap::new();
-    let listed = studio.state.library.open.as_ref().unwrap().source.index().pairs.len();
+    let listed = studio.state.library.open.as_ref().unwrap().source.dataset.index.pairs.len();
     for pair in 0..pairs {
         // As the verbs spread what they take.
         studio.predict((pair * listed / pairs) as u32);
@@ -410,8 +409,19 @@ fn commands_of_tables_and_fits_say_what_decides_them() {
     studio.send(prefer(|s| s.shift = ShiftMode::PaperShift).into());
     assert_eq!(said(&studio, pane, "--shift").as_deref(), Some("paper"));
     assert_eq!(said(&studio, Pane::Adapt, "--pairs"), None);
-    let names: Vec<String> =
-        studio.state.library.open.as_ref().unwrap().source.index().pairs.iter().map(|pair| pair.name.clone()).collect();
+    let names: Vec<String> = studio
+        .state
+        .library
+        .open
+        .as_ref()
+        .unwrap()
+        .source
+        .dataset
+        .index
+        .pairs
+        .iter()
+        .map(|pair| pair.name.clone())
+        .collect();
     studio.send(LibraryCommand::SetFilter(names[1].clone()).into());
     studio.send(LearnCommand::SetForm(LearnForm { pairs: AdaptPairs::Listed, ..LearnForm::default() }).into());
     let listed: Vec<String> = studio.state.library.order.iter().map(|id| names[id.0 as usize].clone()).collect();

@@ -116,7 +116,7 @@ fn paint(paint: Paint) -> SettingsCommand {
 }
 
 fn follow(state: &State) -> Option<Command> {
-    let folder = state.library.open.as_ref().is_some_and(|open| open.source.root().is_some());
+    let folder = state.library.open.as_ref().is_some_and(|open| open.source.dataset.root.is_some());
     when(folder, FollowCommand::Set(state.library.follow.is_none()))
 }
 

@@ -11,7 +11,6 @@ pub use super::learn::LearnCommand;
 pub use super::library::LibraryCommand;
 pub use super::pane::Pane;
 pub use super::predict::PredictCommand;
-pub use super::services::Opened;
 pub use super::settings::SettingsCommand;
 pub use super::state::view::{CameraPreset, Hover, UiRequest};
 pub use super::tasks::TasksCommand;

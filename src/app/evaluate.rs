@@ -5,9 +5,9 @@ pub use super::state::evaluate::ScoreChoice;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::effect::{Access, Effect, Errand};
-use super::jobs::Lane;
-use super::source::DataSource;
+use super::effect::{Access, Effect, Task};
+use super::jobs::Worker;
+use super::source::Source;
 use super::state::State;
 use super::state::library::Sort;
 use super::state::tasks::{Level, TaskKind};
@@ -48,7 +48,7 @@ pub(super) fn step(state: &mut State, command: EvaluateCommand, effects: &mut Ve
             let Some(evaluation) = state.table.result.clone() else { return };
             let published = state.table.published;
             let what = "Export the table";
-            let write = tasks::Write::new(Lane::Files, what, folder, move |folder, _, _| {
+            let write = tasks::Write::new(Worker::Files, what, folder, move |folder, _, _| {
                 let folder = evaluate::export(&evaluation, published, &folder)?;
                 let line = format!("Wrote evaluation.csv and .json to {}", folder.display());
                 Ok((line, folder))
@@ -72,23 +72,22 @@ fn rank(state: &mut State, effects: &mut Vec<Effect>) {
 fn start(state: &mut State, setup: Option<Setup>, what: &str, effects: &mut Vec<Effect>) {
     let (Some(setup), Some(open)) = (setup, &state.library.open) else { return };
     let source = open.source.clone();
-    let title = format!("{what} {}", source.title());
+    let title = format!("{what} {}", source.dataset.title);
     tasks::start(state, title, Score { source, setup }, effects);
 }
 
 /// Scores a data set.
 pub struct Score {
-    source: Arc<dyn DataSource>,
+    source: Arc<Source>,
     setup: Setup,
 }
 
-impl Errand for Score {
+impl Task for Score {
     type End = Arc<Evaluation>;
     const KIND: TaskKind = TaskKind::Evaluate;
 
     fn run(self, access: &Access, cx: &JobCx) -> Result<Self::End, TaskError> {
-        let dataset = self.source.on_disk(Self::KIND.name())?;
-        evaluate::evaluate(dataset, &self.setup, access.services.models(), cx).map(Arc::new)
+        evaluate::evaluate(&self.source.dataset, &self.setup, &access.services.models, cx).map(Arc::new)
     }
 
     fn ended(evaluation: &Self::End, state: &mut State, _: &mut Vec<Effect>) {
@@ -105,7 +104,7 @@ impl Errand for Score {
             state.table.result = Some(evaluation.clone());
         }
         if let Some(open) = &state.library.open {
-            state.table.take(evaluation, open.source.index());
+            state.table.take(evaluation, &open.source.dataset.index);
             state.reorder();
         }
     }

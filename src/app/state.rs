@@ -73,7 +73,7 @@ pub struct State {
 impl State {
     /// The sensors of the open data set; the lab's while none is open.
     pub fn rig(&self) -> Arc<Rig> {
-        self.library.open.as_ref().map_or_else(Rig::lab, |open| open.source.rig())
+        self.library.open.as_ref().map_or_else(Rig::lab, |open| open.source.dataset.rig.clone())
     }
 
     /// The fingers on screen, the active one first.

@@ -154,7 +154,7 @@ fn start_icp(state: &mut State, effects: &mut Vec<Effect>) {
 pub(super) fn run_arrived(state: &mut State, key: &RunKey) {
     let Some(hand) = state.workbench.hand.as_ref().filter(|hand| hand.icp.as_ref() == Some(key)) else { return };
     let source = hand.source;
-    let Some(pose) = state.results.runs.get(key).map(|run| run.grasp_from_object) else { return };
+    let Some(pose) = state.results.runs.get(key).map(|run| run.result.grasp_from_object) else { return };
     let cost = cost_of(state, source, pose);
     if let Some(hand) = &mut state.workbench.hand {
         hand.pose = pose;

@@ -42,7 +42,7 @@ impl Rig {
         let mut rig = Self::new(SIZE, 2)?;
         rig.send(prefer(|s| s.hint_dismissed = true));
         rig.send(prefer(|s| s.mask.choice.source = MaskSource::Truth));
-        assert!(rig.harness.state().state().results.inspections.is_empty(), "nobody looks yet");
+        assert!(rig.harness.state().state().results.runs.is_empty(), "nobody looks yet");
         rig.send(prefer(|s| s.workspace = Workspace::Align));
         Some(rig)
     }
@@ -82,5 +82,5 @@ fn steps_by_keys_by_the_slider_and_in_the_curves() {
     rig.harness.step();
     rig.settle();
     assert_eq!(rig.at()[0], 0);
-    assert_eq!(rig.harness.state().state().results.inspections.len(), 1, "scrubbing registers nothing");
+    assert_eq!(rig.harness.state().state().results.runs.len(), 1, "scrubbing registers nothing");
 }

@@ -54,7 +54,7 @@ fn a_table_is_made_by_a_click_shown_and_exported() {
     for (source, scores) in table.scores.iter().enumerate() {
         for grasp in &scores.grasps {
             let index = &rig.harness.state().state().library.open.as_ref().unwrap().source.clone();
-            let pair = index.index().pairs.iter().position(|entry| entry.name == grasp.pair).unwrap() as u32;
+            let pair = index.dataset.index.pairs.iter().position(|entry| entry.name == grasp.pair).unwrap() as u32;
             assert_eq!(value(&rig, source, pair, Metric::Angle), grasp.angle_error_rad);
             assert_eq!(value(&rig, source, pair, Metric::Psnr), grasp.metric(Metric::Psnr));
         }

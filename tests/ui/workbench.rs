@@ -183,7 +183,7 @@ fn icp_starts_where_the_hand_left_the_tool() {
     let hand = rig.hand();
     let run = hand.from_icp.expect("it came from a registration");
     assert_eq!(run.start.map(|s| s.get()), Some(from));
-    let report = &rig.model().results.runs.get(&run).unwrap().report;
+    let report = rig.model().results.runs.get(&run).unwrap().report();
     assert_eq!((report.start, report.runs.len()), (from, 1), "one start: this one");
     // It comes back to where the registration had been by itself.
     let off =

@@ -148,7 +148,7 @@ pub(super) fn recipe_shown(state: &State, imprint: ImprintSource) -> Recipe {
 
 /// The names of these pairs, as one word; `None` where there are none.
 fn names(state: &State, pairs: impl IntoIterator<Item = PairId>) -> Option<String> {
-    let all = &state.library.open.as_ref()?.source.index().pairs;
+    let all = &state.library.open.as_ref()?.source.dataset.index.pairs;
     let names: Vec<&str> = pairs.into_iter().filter_map(|id| Some(all.get(id.0 as usize)?.name.as_str())).collect();
     (!names.is_empty()).then(|| names.join(","))
 }

@@ -67,7 +67,7 @@ fn title(cx: &Cx<'_>, ui: &mut Ui) {
     let library = &cx.state.library;
     let title = match (&library.opening, &library.open) {
         (Some(place), _) => format!("Opening {place}…"),
-        (None, Some(open)) => open.source.title().to_owned(),
+        (None, Some(open)) => open.source.dataset.title.clone(),
         (None, None) => return,
     };
     let label = egui::Label::new(RichText::new(&title).color(cx.p.strong)).truncate();
@@ -175,12 +175,12 @@ fn list(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
         if done > 0 {
             ui.label(RichText::new(format!("{done} done")).size(SMALL).color(cx.p.good));
         }
-        let problems = library.open.as_ref().map_or(0, |o| o.source.problems().len());
+        let problems = library.open.as_ref().map_or(0, |o| o.source.problems.len());
         if problems > 0 {
             let text = RichText::new(counted(problems, "problem")).size(SMALL).color(cx.p.caution);
             ui.label(text).on_hover_ui(|ui| {
                 if let Some(open) = &cx.state.library.open {
-                    for problem in open.source.problems().iter().take(12) {
+                    for problem in open.source.problems.iter().take(12) {
                         ui.label(format!("{}: {}", problem.file.display(), problem.what));
                         ui.label(caption(problem.hint.as_str(), cx.p));
                     }

@@ -237,10 +237,8 @@ fn correct(cx: &mut Cx<'_>, ui: &mut Ui) {
 fn effect(cx: &Cx<'_>, ui: &mut Ui) {
     let Some(changed) = cx.state.document.changed.as_ref().filter(|c| c.pair == cx.state.pair_name()) else { return };
     let deg = |rad: f64| units::text_deg(rad);
-    let before = changed.before.as_ref().and_then(|key| cx.state.results.poses.get(key));
-    let provisional = results::provisional_pose(cx.state, changed.source);
-    let now = provisional.map_or_else(|| results::pose(cx.state, changed.source), |pose| Lookup::Ready(&**pose));
-    let (text, color) = match (now, before) {
+    let before = changed.before.as_ref().and_then(|key| results::pose_of(cx.state, key));
+    let (text, color) = match (results::pose(cx.state, changed.source), before) {
         (Lookup::Ready(pose), Some(before)) => {
             let (from, to) = (before.angle_rad, pose.angle_rad);
             let change = units::wrap_angle(to - from).to_degrees();
@@ -254,9 +252,6 @@ fn effect(cx: &Cx<'_>, ui: &mut Ui) {
                     false if to < from => cx.p.good,
                     false => cx.p.caution,
                 };
-            }
-            if provisional.is_some() {
-                text += ", checking…";
             }
             (text, color)
         }

@@ -25,7 +25,7 @@ use crate::app::keys::ImprintSource;
 use crate::app::library::Place;
 use crate::app::pane::{Kind, Workspace};
 use crate::app::runtime::Runtime;
-use crate::app::services::SharedServices;
+use crate::app::services::Services;
 use crate::app::settings::Last;
 use crate::app::settings::MaskTool;
 use crate::app::settings::Theme;
@@ -47,10 +47,10 @@ use touch2touch_pipeline::io::fonts;
 /// Options that the studio is started with.
 pub struct Options {
     /// Files and models.
-    pub services: SharedServices,
+    pub services: Arc<Services>,
     /// Path to open; `None` opens what was open last, else the demo.
     pub open: Option<PathBuf>,
-    /// Jobs run between frames on the window's own thread, one per frame, instead of on lanes of their own: the same
+    /// Jobs run between frames on the window's own thread, one per frame, instead of on workers of their own: the same
     /// input then gives the same frames (tests).
     pub inline: bool,
     /// True where the system's file dialogs are tried before the path box.
@@ -67,7 +67,7 @@ pub struct Options {
 
 impl Options {
     /// The usual ones.
-    pub fn new(services: SharedServices, open: Option<PathBuf>) -> Self {
+    pub fn new(services: Arc<Services>, open: Option<PathBuf>) -> Self {
         Self {
             services,
             open,
@@ -251,7 +251,7 @@ impl StudioApp {
             self.panes.memories.browser.scrolled_to = None;
         }
         if self.inline {
-            let more = crate::app::jobs::Lane::iter().any(|lane| self.runtime.run_one(lane));
+            let more = crate::app::jobs::Worker::iter().any(|worker| self.runtime.run_one(worker));
             if more {
                 ctx.request_repaint();
             }

@@ -10,7 +10,7 @@ use crate::app::action::{Action, with_keys};
 use crate::app::command::{LibraryCommand, Pane, TasksCommand, ViewCommand};
 use crate::app::library::Place;
 use crate::app::settings::Theme;
-use crate::app::tasks::{Task, Ticket};
+use crate::app::tasks::{RunningTask, Ticket};
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::dialogs::Purpose;
 use crate::ui::parts::theme::{SMALL, caption, medium};
@@ -232,7 +232,7 @@ fn jobs(cx: &mut Cx<'_>, ui: &mut Ui) {
 }
 
 /// A running job, with its progress and a way to stop it.
-fn job(cx: &mut Cx<'_>, ui: &mut Ui, ticket: Ticket, task: &Task) {
+fn job(cx: &mut Cx<'_>, ui: &mut Ui, ticket: Ticket, task: &RunningTask) {
     let cancel = ui.add_enabled(!task.cancelling, egui::Button::new(RichText::new("Cancel").size(SMALL)));
     let cancel = cancel.accessible_name(format!("Cancel: {}", task.title));
     if cancel.on_hover_text(Action::CancelJobs.behind(task.kind.kept())).clicked() {

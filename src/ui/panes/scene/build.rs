@@ -6,7 +6,7 @@ use eframe::egui::Color32;
 use glam::{DAffine3, DVec3};
 
 use super::{Memory, layers, rgb, steps};
-use crate::app::keys::{CloudKey, DatasetSeq, ImprintKey, ImprintSource};
+use crate::app::keys::{DatasetSeq, EstimateKey, ImprintKey, ImprintSource};
 use crate::app::results;
 use crate::app::settings::SceneLayer;
 use crate::app::workbench::Layer;
@@ -26,7 +26,7 @@ use touch2touch_pipeline::steps::cloud::{Clouds, FingerCloud};
 /// Points as the renderer takes them, made once per cloud.
 pub(super) struct SceneCloud {
     /// The cloud.
-    pub key: CloudKey,
+    pub key: EstimateKey,
     /// Counts up with every new cloud.
     pub revision: u64,
     /// The contact points of each finger.
@@ -53,7 +53,7 @@ pub(super) struct SceneMesh {
 }
 
 /// Points for the renderer, made again only for another cloud.
-pub(super) fn update_cloud(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource, key: CloudKey, clouds: &Clouds) {
+pub(super) fn update_cloud(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource, key: EstimateKey, clouds: &Clouds) {
     update_surface(cx, memory, source, &key);
     let held = &mut memory.clouds[source as usize];
     if held.as_ref().is_some_and(|h| h.key == key) {
@@ -69,7 +69,7 @@ pub(super) fn update_cloud(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSour
 }
 
 /// The membranes as surfaces, made again only for other imprints.
-fn update_surface(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource, key: &CloudKey) {
+fn update_surface(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource, key: &EstimateKey) {
     let held = &mut memory.surfaces[source as usize];
     if !cx.state.settings.scene.shows(SceneLayer::Membrane) {
         *held = None;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::DAffine3;
 
 use super::Memory;
-use crate::app::keys::{ImprintSource, PoseKey};
+use crate::app::keys::{EstimateKey, ImprintSource};
 use crate::app::results;
 use crate::app::workbench::Layer;
 use crate::gpu::mesh::MeshItem;
@@ -35,7 +35,7 @@ pub(super) fn reason_rgb(reason: Reason) -> [u8; 3] {
 
 /// Colors of the contact points of one registration, made once.
 pub(super) struct LayerColors {
-    key: (PoseKey, Layer),
+    key: (EstimateKey, Layer),
     revision: u64,
     /// Values at the ends of the color map, meters; of distances the settings say.
     range: Range,
@@ -113,7 +113,7 @@ pub(super) fn paint_model(memory: &Memory, source: ImprintSource, world_from_mes
 /// Colors the contact points of one finger, if the layer is of this very cloud.
 pub(super) fn paint(memory: &Memory, source: ImprintSource, finger: PadId, item: &mut CloudItem) {
     let Some(colors) = &memory.layer_colors[source as usize] else { return };
-    let same = memory.clouds[source as usize].as_ref().is_some_and(|cloud| cloud.key == colors.key.0.cloud);
+    let same = memory.clouds[source as usize].as_ref().is_some_and(|cloud| cloud.key.parts == colors.key.0.parts);
     if !same {
         return;
     }

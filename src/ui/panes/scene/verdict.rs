@@ -102,9 +102,6 @@ fn said(cx: &Cx<'_>, source: ImprintSource) -> (String, Color32, Vec<String>) {
                 Some(verdict) => (format!("{} · {angle}", verdict.grade), grade_color(cx.p, verdict.grade)),
                 None => (angle, cx.p.strong),
             };
-            if results::provisional_pose(state, source).is_some() {
-                text += " · checking…";
-            }
             let mut details: Vec<String> = Vec::new();
             if let Some(verdict) = &pose.verdict {
                 details.push(format!("{}: {}", verdict.grade, verdict.why));
