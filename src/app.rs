@@ -11,10 +11,10 @@
 //!   looked up.
 //! * [`pane`] is the table of the panes: titles, places, which file of the window draws each and what it needs.
 //! * [`demand::demands`] lists what the visible panes need and do not have; [`runtime::Runtime`] computes that on
-//!   its lanes (files, computing, models) and answers with commands.
+//!   its workers (files, computing, models) and answers with commands.
 //! * [`action::Action`] is the table of what a person can trigger, with its keys: menus, palette and shortcut sheet are made
 //!   from it; [`act`] turns its rows into commands.
-//! * [`services`] joins the model to files and models; the command line calls the same functions.
+//! * [`source`] is an open data set with its labels, [`services`] are the folders and models of the program.
 
 pub mod act;
 pub mod action;

@@ -19,9 +19,9 @@ pub mod mesh;
 pub mod pick;
 pub mod pipelines;
 pub mod points;
+pub mod raster;
 pub mod scene;
 pub mod shaders;
-pub mod sheet;
 pub mod target;
 pub mod view;
 

@@ -18,9 +18,6 @@ mod focus;
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::still::space::{InSpace, SpacePicture, SpaceView};
 
-/// Picture of a pair, or why there is none.
-type Still = Result<Grid<[u8; 4]>, TaskError>;
-
 /// The renderer of stills, on the best graphics device that there is; a software one will do.
 ///
 /// # Errors

@@ -17,7 +17,7 @@ use std::sync::Arc;
 use eframe::egui;
 use eframe::egui_wgpu::WgpuSetup;
 
-use crate::app::services::live::LiveServices;
+use crate::app::services::Services;
 use crate::gpu::Gpu;
 use touch2touch_pipeline::io::caught::caught;
 use window::lost::start_again;
@@ -54,7 +54,7 @@ pub fn run(open: Option<PathBuf>, reset: bool) -> Result<(), String> {
     if let WgpuSetup::CreateNew(setup) = &mut native.wgpu_options.wgpu_setup {
         setup.device_descriptor = Arc::new(Gpu::device_descriptor);
     }
-    let mut options = Options::new(Arc::new(LiveServices::new()), open);
+    let mut options = Options::new(Arc::new(Services::of_user()), open);
     options.reset = reset;
     let loss = options.loss.clone();
     let start: eframe::AppCreator<'_> = Box::new(move |cc| Ok(Box::new(StudioApp::new(cc, options))));

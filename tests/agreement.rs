@@ -8,7 +8,6 @@ mod python;
 mod random;
 mod recipes;
 mod stills;
-mod verbs;
 mod verdicts;
 
 use std::collections::BTreeMap;
@@ -18,7 +17,6 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 use strum::IntoEnumIterator as _;
-use touch2touch::app::action::Action;
 use touch2touch::app::command::{
     Command, DoctorCommand, ExportCommand, LabelsCommand, LearnCommand, LibraryCommand, Pane, PredictCommand,
     ViewCommand,
@@ -28,10 +26,9 @@ use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::learn::{AdaptPairs, LearnForm};
 use touch2touch::app::library::Place;
 use touch2touch::app::runtime::Runtime;
-use touch2touch::app::services::Services as _;
-use touch2touch::app::services::live::LiveServices;
+use touch2touch::app::services::Services;
 use touch2touch::app::settings::prefer;
-use touch2touch::app::settings::{MaskChoice, MaskSettings, MaskSource, MaskTool, Versus, VersusMode};
+use touch2touch::app::settings::{CompareChoice, CompareMode, MaskChoice, MaskSettings, MaskSource, MaskTool};
 use touch2touch::app::state::{Lookup, State};
 use touch2touch::app::{export, results};
 use touch2touch_core::dataset::PairId;
@@ -48,104 +45,6 @@ use touch2touch_pipeline::io::images;
 use touch2touch_pipeline::labels::Labels;
 
 use crate::support::run;
-
-/// How an action is had from the command line.
-enum How {
-    /// By these arguments, which must parse.
-    Verb(&'static [&'static str]),
-    /// Not at all, because it only changes what the window shows or prefers, or moves about in it.
-    Window,
-    /// By options of the verbs that compute: what the window prefers, they are told.
-    Options(&'static [&'static str]),
-    /// It takes back, stops or repeats: a verb is stopped by Ctrl-C and repeated by running it again.
-    Shell,
-}
-
-/// A drawing in 3D, as the journal has it.
-const IN_3D: &str = r#"{"tool": "brush", "radius_px": 9, "points": [[99, 99]], "sight": {"clip_from_grasp":
-    [9, 0, 0, 0, 0, 9, 0, 0, 0, 0, 0, -1, 0, 0, 0.01, 0.2], "size_px": [400, 300], "layers": "all"}}"#;
-
-/// A new action does not compile until it is said here how it is had from the command line.
-fn how(action: Action) -> How {
-    use Action as A;
-    use How::{Options, Shell, Verb, Window};
-    match action {
-        A::OpenFolder | A::OpenDemo | A::Reload => Verb(&["doctor", "demo"]),
-        A::AboutData => Verb(&["doctor", "demo"]),
-        A::Follow => Verb(&["watch", "folder"]),
-        // Labels are on the disk as soon as a verb ends.
-        A::Save => Shell,
-        A::ExportMeasured => Verb(&["export", "demo", "--pair", "a", "--out", "folder"]),
-        A::ExportPredicted => Verb(&["export", "demo", "--pair", "a", "--imprint", "predicted", "--out", "folder"]),
-        A::ExportMasks => Verb(&["masks", "export", "demo", "--out", "folder"]),
-        A::ImportMasks => Verb(&["masks", "import", "demo", "--from", "folder"]),
-        A::Generate => Verb(&["generate", "demo", "--out", "folder"]),
-        A::GenerateNewSeed | A::LockSeed => Options(&["generate", "demo", "--out", "folder", "--seed", "7"]),
-        A::FitPairs => Verb(&["adapt", "demo", "--out", "folder"]),
-        A::UseFit => Options(&["generate", "demo", "--out", "folder", "--bundle", "fitted"]),
-        A::TrainMasks | A::StartTraining => Verb(&["masks", "train", "demo", "--minutes", "10", "--out", "trained"]),
-        A::UseTrained => Options(&["label", "demo", "--pair", "a", "--adopt", "--mask-bundle", "trained"]),
-        A::EvaluateDataset => Verb(&["evaluate", "demo"]),
-        A::PredictAll => Verb(&["evaluate", "demo"]),
-        A::ExportTable => Verb(&["evaluate", "demo", "--out", "folder", "--csv", "a.csv"]),
-        A::NextShift => Options(&["pose", "demo", "--imprint", "predicted", "--shift", "raw"]),
-        A::Refit => Verb(&["stats", "demo", "--out", "statistics.json"]),
-        A::FillHoles => Verb(&["label", "demo", "--pair", "a", "--clean", "fill_holes"]),
-        A::LargestIsland => Verb(&["label", "demo", "--pair", "a", "--clean", "largest_island"]),
-        A::SmoothMask => Verb(&["label", "demo", "--pair", "a", "--clean", "smooth=1"]),
-        A::GrowMask => Verb(&["label", "demo", "--pair", "a", "--clean", "grow=1"]),
-        A::ShrinkMask => Verb(&["label", "demo", "--pair", "a", "--clean", "shrink=1"]),
-        A::AdoptAutomatic => Verb(&["label", "demo", "--pair", "a", "--adopt", "--mask", "top_percent"]),
-        A::Propose | A::NextProposal => Verb(&["label", "demo", "--pair", "a", "--propose", "cad_registered"]),
-        A::ResetMask => Verb(&["label", "demo", "--pair", "a", "--remove-mask"]),
-        A::DoneAndNext => Verb(&["label", "demo", "--pair", "a", "--review", "done"]),
-        A::Flag => Verb(&["label", "demo", "--pair", "a", "--review", "flagged"]),
-        A::Skip => Verb(&["label", "demo", "--pair", "a", "--review", "skip"]),
-        A::MarkTodo => Verb(&["label", "demo", "--pair", "a", "--review", "todo"]),
-        A::AcceptMeasuredPose => Verb(&["label", "demo", "--pair", "a", "--accept", "measured"]),
-        A::AcceptPredictedPose => Verb(&["label", "demo", "--pair", "a", "--accept", "predicted"]),
-        A::Accept => Verb(&["label", "demo", "--pair", "a", "--accept", "measured", "--pose", "-3,0,1.5"]),
-        A::RunPose => Verb(&["pose", "demo"]),
-        A::TryTools => Verb(&["pose", "demo", "--tool", "any"]),
-        A::IcpFromHere => Verb(&["pose", "demo", "--start", "10,0,-2"]),
-        A::OwnStarts => Verb(&["pose", "demo", "--pair", "a"]),
-        A::NextPoseEngine => Options(&["pose", "demo", "--engine", "lab_icp"]),
-        // Steps, residuals and reasons are in the report of the registration.
-        A::StepBack | A::StepForward | A::FirstStep | A::LastStep | A::PlaySteps | A::PinStep | A::Correspondences => {
-            Options(&["pose", "demo", "--trace", "--json"])
-        }
-        A::Distances | A::NextLayer => Options(&["pose", "demo", "--trace", "--json"]),
-        A::CancelJobs | A::Undo | A::Redo => Shell,
-        A::PreviousPair | A::NextPair | A::TenBack | A::TenForward | A::FirstPair | A::LastPair => Window,
-        A::NextUnfinished | A::NextWorst | A::OtherFinger | A::BothFingers | A::FindPair => Window,
-        A::Brush | A::Eraser | A::Lasso | A::Polygon | A::RectangleTool | A::Wand => Verb(&[
-            "label",
-            "demo",
-            "--pair",
-            "a",
-            "--draw",
-            r#"{"tool": "lasso", "paint": "contact", "points": [[9, 9], [30, 9], [9, 30]]}"#,
-        ]),
-        A::PaintIn3d | A::PaintLayers => Verb(&["label", "demo", "--pair", "a", "--draw", IN_3D]),
-        A::PanTool | A::LastTool | A::PaintIgnore | A::LetThrough | A::BrushSmaller | A::BrushLarger => Window,
-        A::MaskVisible | A::MaskOutline | A::MaskFainter | A::MaskStronger => Window,
-        A::PoseTool | A::RevertHand | A::MeasureDistance | A::MeasureAngle => Window,
-        A::NudgeLeft | A::NudgeRight | A::NudgeUp | A::NudgeDown | A::TurnLeft | A::TurnRight => Window,
-        A::LockRange | A::RangeOnce | A::ResetRange | A::Fit | A::BothClouds | A::LinkCameras | A::Footprint => Window,
-        A::CompareMode | A::SwapCompared => {
-            Options(&["compare", "demo", "--pair", "a", "--a", "prediction:seed=7", "--b", "measured"])
-        }
-        A::WindowOnly | A::MembraneSurface | A::EyeDome | A::Parallel | A::CopyCamera => Window,
-        A::CameraLeft | A::CameraRight | A::CameraFront | A::CameraBack | A::CameraTop | A::CameraBottom => Window,
-        A::CameraOblique | A::NextSides | A::NextGel | A::SwitchTheme => Window,
-        A::InspectWorkspace | A::AlignWorkspace | A::LabelWorkspace | A::EvaluateWorkspace | A::AdaptWorkspace => {
-            Window
-        }
-        A::ResetWorkspace | A::MaximizePane | A::Fullscreen | A::Screenshot | A::CopyHovered => Window,
-        A::SavePane | A::CopyPane => Window,
-        A::Palette | A::ShortcutSheet | A::ResetSettings => Window,
-    }
-}
 
 #[test]
 pub(crate) fn what_is_said_of_a_data_set_is_the_same_in_the_panel_and_by_the_verb() {
@@ -178,21 +77,6 @@ pub(crate) fn what_is_said_of_a_data_set_is_the_same_in_the_panel_and_by_the_ver
     }
 }
 
-#[test]
-fn every_action_that_computes_or_writes_has_its_verb() {
-    let (mut verbs, mut all) = (0, 0);
-    for action in Action::iter() {
-        all += 1;
-        let (How::Verb(arguments) | How::Options(arguments)) = how(action) else { continue };
-        verbs += 1;
-        let words = std::iter::once(&"touch2touch").chain(arguments).copied();
-        if let Err(err) = touch2touch::headless::check_command(words) {
-            panic!("{action:?}: {arguments:?}: {err}");
-        }
-    }
-    assert!(verbs > 35 && all > verbs, "{verbs} of {all}");
-}
-
 /// The studio on a place, run until nothing is left to compute.
 struct Studio {
     state: State,
@@ -201,7 +85,7 @@ struct Studio {
 
 impl Studio {
     fn open(place: Place, home: &Path) -> Self {
-        let services = LiveServices::with_config_folder(Some(home.to_owned()));
+        let services = Services::with_config_folder(Some(home.to_owned()));
         let mut settings = services.load_settings().0;
         settings.generate.by_itself = false;
         settings.about_own_data = false;
@@ -263,7 +147,7 @@ fn assert_same(place: Place, path: &str, home: &Path, pairs: usize) -> BTreeMap<
     let generated = json(&generate, home);
     let mut studio = Studio::open(place, home);
     let mut compared: BTreeMap<String, usize> = BTreeMap::new();
-    let listed = studio.state.library.open.as_ref().unwrap().source.index().pairs.len();
+    let listed = studio.state.library.open.as_ref().unwrap().source.dataset.index.pairs.len();
     for pair in 0..pairs {
         // As the verbs spread what they take.
         studio.predict((pair * listed / pairs) as u32);
@@ -339,9 +223,9 @@ fn two_predictions_are_compared_by_one_function() {
     let (a, b) = ("prediction:seed=7,shift=raw", "mean:seeds=2");
     let mut studio = Studio::open(Place::Demo, home.path());
     studio.send(ViewCommand::ShowPanes([Pane::Compare].into_iter().collect()).into());
-    let versus = Versus { a: a.parse().unwrap(), b: b.parse().unwrap(), mode: VersusMode::default() };
-    let shown = versus.clone();
-    studio.send(prefer(move |s| *s.versus_mut() = shown.clone()).into());
+    let compared = CompareChoice { a: a.parse().unwrap(), b: b.parse().unwrap(), mode: CompareMode::default() };
+    let shown = compared.clone();
+    studio.send(prefer(move |s| *s.compare_mut() = shown.clone()).into());
     studio.send(LibraryCommand::Select(PairId(40)).into());
     let state = &studio.state;
     let report = json(&["compare", "demo", "--pair", state.pair_name(), "--a", a, "--b", b], home.path());
@@ -349,16 +233,16 @@ fn two_predictions_are_compared_by_one_function() {
     assert_eq!(fingers.len(), 2);
     for (pad, finger) in state.rig().pads().zip(fingers) {
         for (key, [one, other]) in [
-            ("a", [&versus.a, &Subject::Measured]),
-            ("b", [&versus.b, &Subject::Measured]),
-            ("a_b", [&versus.a, &versus.b]),
+            ("a", [&compared.a, &Subject::Measured]),
+            ("b", [&compared.b, &Subject::Measured]),
+            ("a_b", [&compared.a, &compared.b]),
         ] {
             let found = results::subjects_compared(state, one, other, pad).ready().expect(key);
             assert_eq!(finger[key]["psnr_db"], optional(found.psnr_db), "{key}");
             assert_eq!(finger[key]["ssim"], optional(found.ssim), "{key}");
         }
     }
-    for (key, subject) in [("a_deg", &versus.a), ("b_deg", &versus.b)] {
+    for (key, subject) in [("a_deg", &compared.a), ("b_deg", &compared.b)] {
         let pose = results::subject_pose(state, subject).expect("a pose");
         assert_eq!(report["poses"][key], number(pose.angle_rad.to_degrees()), "{key}");
     }
@@ -515,19 +399,29 @@ fn said(studio: &Studio, pane: Pane, option: &str) -> Option<String> {
 fn commands_of_tables_and_fits_say_what_decides_them() {
     let home = tempfile::tempdir().unwrap();
     let mut studio = Studio::open(Place::Demo, home.path());
-    for pane in [Pane::Results, Pane::Table] {
-        studio.send(prefer(|s| s.shift = ShiftMode::ExactInverse).into());
-        studio.send(prefer(|s| s.runtime = EngineChoice::Rten).into());
-        assert_eq!(said(&studio, pane, "--shift").as_deref(), Some("exact"), "{pane:?}");
-        assert_eq!(said(&studio, pane, "--runtime").as_deref(), Some("rten"), "{pane:?}");
-        studio.send(prefer(|s| s.shift = ShiftMode::Parts(CorrectionParts::NONE)).into());
-        assert_eq!(said(&studio, pane, "--shift").as_deref(), Some("exact:none"), "{pane:?}");
-        studio.send(prefer(|s| s.shift = ShiftMode::PaperShift).into());
-        assert_eq!(said(&studio, pane, "--shift").as_deref(), Some("paper"), "{pane:?}");
-    }
+    let pane = Pane::Results;
+    studio.send(prefer(|s| s.shift = ShiftMode::ExactInverse).into());
+    studio.send(prefer(|s| s.runtime = EngineChoice::Rten).into());
+    assert_eq!(said(&studio, pane, "--shift").as_deref(), Some("exact"));
+    assert_eq!(said(&studio, pane, "--runtime").as_deref(), Some("rten"));
+    studio.send(prefer(|s| s.shift = ShiftMode::Parts(CorrectionParts::NONE)).into());
+    assert_eq!(said(&studio, pane, "--shift").as_deref(), Some("exact:none"));
+    studio.send(prefer(|s| s.shift = ShiftMode::PaperShift).into());
+    assert_eq!(said(&studio, pane, "--shift").as_deref(), Some("paper"));
     assert_eq!(said(&studio, Pane::Adapt, "--pairs"), None);
-    let names: Vec<String> =
-        studio.state.library.open.as_ref().unwrap().source.index().pairs.iter().map(|pair| pair.name.clone()).collect();
+    let names: Vec<String> = studio
+        .state
+        .library
+        .open
+        .as_ref()
+        .unwrap()
+        .source
+        .dataset
+        .index
+        .pairs
+        .iter()
+        .map(|pair| pair.name.clone())
+        .collect();
     studio.send(LibraryCommand::SetFilter(names[1].clone()).into());
     studio.send(LearnCommand::SetForm(LearnForm { pairs: AdaptPairs::Listed, ..LearnForm::default() }).into());
     let listed: Vec<String> = studio.state.library.order.iter().map(|id| names[id.0 as usize].clone()).collect();

@@ -2,7 +2,7 @@
 //! thread, so that every order of events can be had on purpose.
 
 mod answered;
-mod double;
+mod bench;
 mod generating;
 mod inspect;
 mod masks;
@@ -12,21 +12,19 @@ mod unsaved;
 mod whole;
 
 use std::collections::BTreeSet;
-use std::sync::atomic::Ordering;
 
 use strum::IntoEnumIterator as _;
 use touch2touch::app::command::{Command, LibraryCommand, Pane, PredictCommand, TasksCommand, ViewCommand};
-use touch2touch::app::jobs::Lane;
+use touch2touch::app::jobs::Worker;
 use touch2touch::app::keys::{ImprintSource, ShiftMode};
 use touch2touch::app::library::{Place, Sort};
 use touch2touch::app::settings::prefer;
 use touch2touch::app::state::{Absent, Lookup};
-use touch2touch::app::tasks::Level;
 use touch2touch::app::{demand, results};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::{PadId, lab};
 
-use double::{Bench, IMPRINT_SIZE};
+use bench::{Bench, IMPRINT_SIZE, PAIR};
 
 const RIGHT: PadId = lab::RIGHT;
 
@@ -37,8 +35,8 @@ fn panes(list: &[Pane]) -> Command {
 #[test]
 fn from_opening_to_the_figures() {
     let mut bench = Bench::open();
-    assert_eq!(bench.state.library.order.len(), 12);
-    assert_eq!(bench.state.pair_name(), "tool_a/data_0", "the first pair is shown at once");
+    assert_eq!(bench.state.library.order.len(), 13);
+    assert_eq!(bench.state.pair_name(), PAIR, "the first pair is shown at once");
     assert!(matches!(results::imprint(&bench.state, ImprintSource::Measured, RIGHT), Lookup::Waiting));
     bench.send(panes(&[Pane::Measured, Pane::Predicted, Pane::Compare, Pane::Metrics]));
     bench.settle();
@@ -56,50 +54,45 @@ fn from_opening_to_the_figures() {
         "the figures need both fingers: one batch"
     );
     bench.settle();
-    assert_eq!((bench.services.generated(), bench.services.batches.load(Ordering::Relaxed)), (2, 1));
+    assert_eq!(bench.generated(), 2);
     let recipe = results::chosen(&bench.state, RIGHT).unwrap().clone();
     assert_eq!(recipe.config.seed, 42);
     assert_eq!(results::imprint(&bench.state, ImprintSource::Predicted, RIGHT).ready().unwrap().size(), IMPRINT_SIZE);
     let comparison = results::comparison(&bench.state, RIGHT).ready().unwrap();
     assert!(comparison.psnr_db.is_some_and(f64::is_finite) && comparison.mae_m > 0.0);
     // The same recipe again is there already.
-    let runs = bench.services.generated();
+    let runs = bench.generated();
     bench.send(PredictCommand::Generate);
     assert!(bench.state.tasks.running.is_empty());
-    assert_eq!(bench.services.generated(), runs);
+    assert_eq!(bench.generated(), runs);
     // Another range mapping needs no model.
     bench.send(prefer(|s| s.shift = ShiftMode::Raw));
     bench.settle();
     assert!(results::comparison(&bench.state, RIGHT).ready().is_some());
-    assert_eq!(bench.services.generated(), runs);
-    // A bundle without statistics has no paper shift: the pane says so, the log does not repeat it.
-    let errors = bench.errors();
-    bench.send(prefer(|s| s.shift = ShiftMode::PaperShift));
-    bench.settle();
-    assert!(matches!(results::imprint(&bench.state, ImprintSource::Predicted, RIGHT), Lookup::Failed(_)));
-    assert_eq!(bench.errors(), errors);
+    assert_eq!(bench.generated(), runs);
 }
 
 #[test]
 fn what_is_not_on_screen_is_not_computed() {
     let mut bench = Bench::open();
     bench.settle();
-    assert_eq!(bench.services.source.loads(), 0, "no pane, no work");
+    assert_eq!(bench.state.results.samples.len(), 0, "no pane, no work");
     bench.send(panes(&[Pane::Log, Pane::Settings]));
     assert!(demand::demands(&bench.state).is_empty());
     bench.send(panes(&[Pane::GelSlim]));
     bench.settle();
-    let loaded = bench.services.source.loads();
+    let loaded = bench.state.results.samples.len();
     assert_eq!(loaded, 5, "the pair shown and four neighbors on the one side that has any");
-    assert!(bench.state.results.masks.is_empty() && bench.state.results.clouds.is_empty());
+    assert!(bench.state.results.estimates.is_empty());
     bench.send(panes(&[Pane::Browser]));
     bench.send(LibraryCommand::ShowRows(0..3));
     bench.settle();
     assert_eq!(bench.state.results.thumbnails.len(), 3);
     bench.send(panes(&[Pane::Measured]));
     bench.settle();
-    assert_eq!(bench.state.results.masks.len(), 1, "only the active finger is on screen");
-    assert_eq!(bench.services.source.loads(), loaded, "thumbnails of loaded pairs need no file");
+    let masked = |finger| results::mask_in_force(&bench.state, ImprintSource::Measured, finger).is_ok();
+    assert!(masked(RIGHT) && !masked(lab::LEFT), "only the active finger is on screen");
+    assert_eq!(bench.state.results.samples.len(), loaded, "thumbnails of loaded pairs need no file");
 }
 
 #[test]
@@ -121,13 +114,14 @@ fn a_late_result_lands_under_its_own_key() {
     bench.send(LibraryCommand::Reload);
     bench.settle();
     assert!(bench.state.results.predictions.is_empty() && bench.state.tasks.running.is_empty());
-    assert_eq!(bench.state.pair_name(), "tool_a/data_0");
+    assert_eq!(bench.state.pair_name(), PAIR);
 }
 
 #[test]
 fn only_the_last_opening_counts() {
     let mut bench = Bench::open();
-    bench.send(LibraryCommand::Open(Place::Path("slow".into())));
+    let another = bench.another();
+    bench.send(LibraryCommand::Open(another));
     bench.send(LibraryCommand::Open(Place::Path("missing".into())));
     bench.send(LibraryCommand::Open(Place::Demo));
     bench.settle();
@@ -150,12 +144,7 @@ fn jobs_stop_when_told() {
     bench.send(TasksCommand::CancelAll);
     bench.tick();
     assert!(bench.state.tasks.running.is_empty(), "waiting jobs end without their turn");
-    assert_eq!(bench.services.generated(), 0);
-    // One that runs sees the flag at its next step.
-    bench.services.cancel_itself_at_step(2);
-    bench.send(PredictCommand::Generate);
-    bench.settle();
-    assert!(bench.state.tasks.running.is_empty() && bench.state.results.predictions.is_empty());
+    assert_eq!(bench.generated(), 0);
     assert_eq!(bench.errors(), 0, "being told to stop is no error");
     assert!(bench.log().iter().any(|line| line.contains("cancelled")));
 }
@@ -163,71 +152,39 @@ fn jobs_stop_when_told() {
 #[test]
 fn a_failure_is_said_once_and_not_tried_again_by_itself() {
     let mut bench = Bench::open();
-    bench.services.source.fail(1);
+    bench.spoil(1, true);
     bench.send(panes(&[Pane::Measured]));
     bench.settle();
     assert_eq!(bench.errors(), 0, "pair 1 was only loaded ahead");
-    let loads = bench.services.source.loads();
+    let loads = bench.state.results.samples.len();
     bench.send(LibraryCommand::Select(PairId(1)));
     bench.settle();
     assert_eq!(bench.errors(), 1);
     assert!(matches!(results::imprint(&bench.state, ImprintSource::Measured, RIGHT), Lookup::Failed(_)));
     bench.settle();
-    assert_eq!((bench.errors(), bench.services.source.loads_of(1)), (1, 1));
-    assert!(bench.services.source.loads() > loads, "the neighbors are loaded all the same");
-    bench.services.source.heal();
+    assert_eq!(bench.errors(), 1);
+    assert!(bench.state.results.samples.len() > loads, "the neighbors are loaded all the same");
+    bench.spoil(1, false);
     bench.send(TasksCommand::Retry);
     bench.settle();
     assert!(results::imprint(&bench.state, ImprintSource::Measured, RIGHT).ready().is_some());
 }
 
 #[test]
-fn a_panic_in_a_job_is_caught_and_the_lane_goes_on() {
-    let mut bench = Bench::open();
-    bench.services.source.panic(0);
-    bench.services.panic_in_generate();
-    bench.send(panes(&[Pane::Measured]));
-    bench.settle();
-    assert_eq!(bench.errors(), 1);
-    bench.send(LibraryCommand::Select(PairId(1)));
-    bench.settle();
-    assert!(results::imprint(&bench.state, ImprintSource::Measured, RIGHT).ready().is_some());
-    bench.send(PredictCommand::Generate);
-    bench.settle();
-    assert!(bench.state.tasks.running.is_empty());
-    let last = bench.state.log.entries.back().unwrap();
-    assert_eq!(last.level, Level::Error);
-    assert!(last.detail.as_deref().unwrap().contains("the model fell over"));
-}
-
-#[test]
 fn the_newest_request_replaces_a_waiting_one() {
     let mut bench = Bench::open();
     bench.send(panes(&[Pane::Measured]));
+    let first = bench.state.pair_key().unwrap();
     // Scrubbing: nothing runs meanwhile.
     for _ in 0..11 {
         bench.send(LibraryCommand::Step(1));
     }
     let last = bench.state.pair_key().unwrap();
     assert_eq!(last.pair, PairId(11));
-    assert!(bench.runtime.waiting(Lane::Files) <= 2 + 4 + 1, "labels, the pair, four neighbors and the settings");
+    assert!(bench.runtime.waiting(Worker::Files) <= 2 + 4 + 1, "labels, the pair, four neighbors and the settings");
     bench.settle();
-    assert_eq!(bench.services.source.loads_of(0), 0);
-    assert_eq!(bench.services.source.loads_of(11), 1);
+    assert!(!bench.state.results.samples.contains(&first));
     assert!(bench.state.results.samples.contains(&last));
-}
-
-#[test]
-fn a_request_that_runs_is_not_started_twice() {
-    let mut bench = Bench::open();
-    bench.send(panes(&[Pane::GelSlim]));
-    // Labels first, then the sample, then a neighbor: its answer waits while the screen goes on.
-    assert!(bench.runtime.run_one(Lane::Files));
-    while bench.services.source.loads() == 0 {
-        assert!(bench.runtime.run_one(Lane::Files));
-    }
-    bench.settle();
-    assert!((0..5).all(|pair| bench.services.source.loads_of(pair) == 1));
 }
 
 #[test]
@@ -261,7 +218,6 @@ fn the_list_filters_and_sorts() {
 fn preferences_are_kept_in_range_and_saved() {
     let mut bench = Bench::open();
     bench.settle();
-    let saved = bench.services.settings_saved();
     bench.send(prefer(|s| s.mask.radius_px = f32::NAN));
     bench.send(prefer(|s| s.mask.radius_px = 1e9));
     assert_eq!(bench.state.settings.mask.radius_px, 40.0);
@@ -270,6 +226,7 @@ fn preferences_are_kept_in_range_and_saved() {
     let range = bench.state.settings.range;
     bench.send(prefer(move |s| (s.range.min_m, s.range.max_m) = (1.0, f32::NAN)));
     assert_eq!(bench.state.settings.range, range);
+    assert_eq!(bench.runtime.waiting(Worker::Files), 1, "changes that wait for the disk become one");
     bench.settle();
-    assert_eq!(bench.services.settings_saved(), saved + 1, "changes that wait for the disk become one");
+    assert_eq!(bench.folders.services(false).load_settings().0.mask_opacity, 0.0);
 }

@@ -13,20 +13,16 @@ use touch2touch_pipeline::io::masks::{ByImprint, MaskStore, StoredReview};
 
 use crate::support::{self, run};
 
-#[cfg(feature = "onnx")]
 mod documented;
 mod hostile;
 mod links;
-#[cfg(feature = "onnx")]
 mod notes;
 mod outputs;
 mod pages;
 mod read_as;
 mod refused;
-#[cfg(feature = "onnx")]
 mod stats;
 mod unit;
-#[cfg(feature = "onnx")]
 mod watch;
 
 fn json(output: &Output) -> Value {
@@ -183,7 +179,6 @@ fn the_five_faults_are_written_and_told_apart() {
 }
 
 /// With the tiny bundles: the form of the table, not its figures.
-#[cfg(feature = "onnx")]
 #[test]
 fn the_results_table_is_printed_and_written() {
     let dir = tempfile::tempdir().unwrap();
@@ -243,7 +238,6 @@ fn the_results_table_is_printed_and_written() {
 }
 
 /// The lab's own predictions in the picture folder, as they were measured before.
-#[cfg(feature = "onnx")]
 #[test]
 fn stored_predictions_get_a_row() {
     let Some(pairs) = support::shared("real-pairs") else { return };

@@ -6,19 +6,15 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use strum::IntoEnumIterator as _;
-use touch2touch::app::keys::{DatasetSeq, PairKey, PredictionKey, TouchKey};
 use touch2touch::app::services::Services;
-use touch2touch::app::services::live::LiveServices;
-use touch2touch_core::dataset::PairId;
 use touch2touch_core::diffusion::{GenerateConfig, Progress, Sampler, Spacing};
 use touch2touch_core::grid::{Grid, RgbGrid};
 use touch2touch_core::postprocess::RawPrediction;
-use touch2touch_core::rig::{PadId, lab};
 use touch2touch_pipeline::infer::bundle::{Bundle, MANIFEST};
 use touch2touch_pipeline::infer::engine::EngineChoice;
 use touch2touch_pipeline::infer::generator::{GenerateError, Generator, Item, Observer};
 use touch2touch_pipeline::job::JobCx;
-use touch2touch_pipeline::steps::bundles::BundleInfo;
+use touch2touch_pipeline::steps::bundles::{self, BundleInfo};
 use touch2touch_pipeline::steps::models::{GenerateInput, Models};
 
 fn fixture() -> PathBuf {
@@ -213,54 +209,49 @@ fn e22_every_input_gives_finite_pictures_or_a_clear_error() {
     }
 }
 
-fn bundle(services: &LiveServices) -> BundleInfo {
-    let (bundles, _) = services.find_bundles(&[fixture()]);
-    bundles.into_iter().find(|b| b.name == "Tiny generator of the tests").expect("the fixture is a generator")
-}
-
-fn touch(finger: PadId) -> TouchKey {
-    PairKey { dataset: DatasetSeq(1), pair: PairId(0) }.finger(finger)
+fn bundle() -> BundleInfo {
+    bundles::find(&[fixture()])
+        .bundles
+        .into_iter()
+        .find(|b| b.name == "Tiny generator of the tests")
+        .expect("the fixture is a generator")
 }
 
 #[test]
 fn a_prediction_is_found_again_after_a_restart_and_never_for_another_image() {
     let folder = tempfile::tempdir().unwrap();
-    let start = || LiveServices::with_config_folder(Some(folder.path().to_owned()));
+    let start = || Services::with_config_folder(Some(folder.path().to_owned()));
     let cx = JobCx::unwatched();
     let (a, b) = (image(0.0), image(1.0));
     let services = start();
-    let info = bundle(&services);
-    let recipe = |finger, seed| PredictionKey {
-        touch: touch(finger),
-        bundle: info.id.clone(),
-        config: GenerateConfig { seed, ..config() },
-        runtime: EngineChoice::Rten,
-    };
+    let info = bundle();
     let item = |seed, difference| GenerateInput { difference, seed, size: [0, 0] };
-    assert!(services.stored(std::slice::from_ref(&info), EngineChoice::Rten, touch(lab::RIGHT), &a).is_empty());
+    assert!(services.models.kept(std::slice::from_ref(&info), EngineChoice::Rten, &a).is_empty());
     let both = [item(1, &a), item(1, &b)];
-    let made = services.predict(&info, EngineChoice::Rten, &config(), &both, &cx).unwrap();
+    let made = services.models.predict(&info, EngineChoice::Rten, &config(), &both, &cx).unwrap();
     assert!(made.iter().all(|m| !m.kept));
 
     let again = start();
-    let found = again.predict(&info, EngineChoice::Rten, &config(), &both, &cx).unwrap();
+    let found = again.models.predict(&info, EngineChoice::Rten, &config(), &both, &cx).unwrap();
     assert!(found.iter().all(|m| m.kept), "read, not made");
     for (made, found) in made.iter().zip(&found) {
         assert_eq!(made.raw, found.raw);
         assert_eq!(made.chains.keys().collect::<Vec<_>>(), found.chains.keys().collect::<Vec<_>>());
     }
-    let listed = again.stored(std::slice::from_ref(&info), EngineChoice::Rten, touch(lab::RIGHT), &a);
-    assert_eq!(listed.iter().map(|(key, _)| key.clone()).collect::<Vec<_>>(), [recipe(lab::RIGHT, 1)]);
+    let listed = again.models.kept(std::slice::from_ref(&info), EngineChoice::Rten, &a);
+    let [kept] = &listed[..] else { panic!("{listed:?}") };
+    assert_eq!((&kept.prediction.bundle, kept.engine), (&info.id, EngineChoice::Rten));
+    assert_eq!(kept.config, GenerateConfig { seed: 1, ..config() });
     // The same pair and finger with another image (another data set of the same names) is another touch.
-    assert!(again.stored(std::slice::from_ref(&info), EngineChoice::Rten, touch(lab::RIGHT), &image(2.0)).is_empty());
+    assert!(again.models.kept(std::slice::from_ref(&info), EngineChoice::Rten, &image(2.0)).is_empty());
     let another = image(2.0);
-    let other = again.predict(&info, EngineChoice::Rten, &config(), &[item(1, &another)], &cx).unwrap();
+    let other = again.models.predict(&info, EngineChoice::Rten, &config(), &[item(1, &another)], &cx).unwrap();
     assert!(!other[0].kept && other[0].raw != made[0].raw);
     // Half known, half new: only the new one is made. Another engine's results are not taken for this one's.
-    let half = again.predict(&info, EngineChoice::Rten, &config(), &[item(2, &a), item(1, &b)], &cx).unwrap();
+    let half = again.models.predict(&info, EngineChoice::Rten, &config(), &[item(2, &a), item(1, &b)], &cx).unwrap();
     assert!(!half[0].kept && half[1].kept);
-    assert_eq!(again.stored(std::slice::from_ref(&info), EngineChoice::Rten, touch(lab::RIGHT), &a).len(), 2);
-    assert!(again.stored(&[], EngineChoice::Rten, touch(lab::RIGHT), &a).is_empty(), "its bundle is gone");
+    assert_eq!(again.models.kept(std::slice::from_ref(&info), EngineChoice::Rten, &a).len(), 2);
+    assert!(again.models.kept(&[], EngineChoice::Rten, &a).is_empty(), "its bundle is gone");
 
     // Damaged files are not there; a budget of nothing keeps nothing.
     for entry in std::fs::read_dir(folder.path().join("predictions")).unwrap() {
@@ -270,9 +261,9 @@ fn a_prediction_is_found_again_after_a_restart_and_never_for_another_image() {
     let mut settings = services.load_settings().0;
     settings.cache_mib = 0;
     services.save_settings(&settings).unwrap();
-    let made_again = services.predict(&info, EngineChoice::Rten, &config(), &both, &cx).unwrap();
+    let made_again = services.models.predict(&info, EngineChoice::Rten, &config(), &both, &cx).unwrap();
     assert!(made_again.iter().all(|m| !m.kept) && made_again[0].raw == made[0].raw);
-    assert!(services.stored(std::slice::from_ref(&info), EngineChoice::Rten, touch(lab::RIGHT), &a).is_empty());
+    assert!(services.models.kept(std::slice::from_ref(&info), EngineChoice::Rten, &a).is_empty());
 }
 
 /// A thread of a pool takes on other work while it waits for the engine; that work wants the same model.

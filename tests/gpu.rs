@@ -14,8 +14,8 @@ use touch2touch::gpu::lines::{LinesItem, LinesStyle, Segment};
 use touch2touch::gpu::mesh::{self, Look, MeshItem, MeshStyle, Shading};
 use touch2touch::gpu::pipelines::Pipelines;
 use touch2touch::gpu::points::{CloudItem, CloudStyle, PointColors, PointSize};
+use touch2touch::gpu::raster::Raster;
 use touch2touch::gpu::scene::{SceneData, SceneRenderer};
-use touch2touch::gpu::sheet::TriangleSheet;
 use touch2touch::gpu::target::{Picture, Target};
 use touch2touch::gpu::view::{Camera, Plane, Preset};
 use touch2touch::gpu::{Gpu, GpuError, guides, wgpu};
@@ -321,7 +321,7 @@ fn a_device_without_storage_buffers_paints_the_window_and_says_what_the_3d_views
         (adapter, device, queue)
     });
     let gpu = Gpu::new(&adapter, device, queue);
-    TriangleSheet::new(&gpu, COLOR_FORMAT).unwrap().prove(&gpu, COLOR_FORMAT).unwrap();
+    Raster::new(&gpu, COLOR_FORMAT).unwrap().prove(&gpu, COLOR_FORMAT).unwrap();
     let why = Pipelines::new(&gpu).unwrap_err();
     assert!(matches!(&why, GpuError::NoStorage { .. }), "{why}");
     assert!(why.to_string().contains("mesa-vulkan-drivers"), "{why}");

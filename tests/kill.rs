@@ -3,8 +3,8 @@
 //! One test plays both parts. The parent starts this binary again on the same test with [`ROLE`] set; that child drives
 //! the application model over real files (every drawing tool, contact and ignored pixels, clean-ups, undo, navigation, review
 //! states, exports in every form, by a seeded script) and says after each round up to which act a pair is saved, as the
-//! model's document has it. The parent plays the same script
-//! by itself, without saving, so that it knows every mask after every act; kills the child at a random moment; and reads
+//! model's document has it. The parent kills the child at a random moment; plays the same script in a copy of the folder as it
+//! was before, so that it knows every mask after every act; and reads
 //! the folder with the product's reader. Each mask and review state must be one that was there at the last confirmation or
 //! later, and every file must parse; an export that has its list must be whole. The next round goes on in the folder that the
 //! last one left. What a kill leaves of a training is looked at in `training.rs`, where there are models.
@@ -21,37 +21,27 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use sha2::Digest as _;
 use strum::IntoEnumIterator as _;
-use touch2touch::app::command::{Command, ExportCommand, LabelsCommand, LibraryCommand, Opened, Pane, ViewCommand};
+use touch2touch::app::command::{Command, ExportCommand, LabelsCommand, LibraryCommand, Pane, ViewCommand};
 use touch2touch::app::export::Output;
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::labels::{DrawnMask, MaskPlace, PairLabels, Review};
 use touch2touch::app::library::Place;
 use touch2touch::app::results;
 use touch2touch::app::runtime::Runtime;
-use touch2touch::app::services::live::{LiveSource, open_source};
-use touch2touch::app::services::{DataSource, Services};
+use touch2touch::app::services::Services;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{MaskTool, Settings};
+use touch2touch::app::source::Source;
 use touch2touch::app::state::{Lookup, State};
-use touch2touch_core::contact::ContactMask;
-use touch2touch_core::dataset::{Index, PairId, Problem};
-use touch2touch_core::diffusion::GenerateConfig;
-use touch2touch_core::grid::{DepthMap, Grid};
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::grid::Grid;
 use touch2touch_core::label::{CleanKind, CleanUp, PackedMask, Paint};
-use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::rig::lab;
-use touch2touch_core::sample::Sample;
-use touch2touch_pipeline::error::TaskError;
-use touch2touch_pipeline::export::{ExportChoice, Plan, Which};
-use touch2touch_pipeline::infer::engine::EngineChoice;
+use touch2touch_pipeline::export::{DrawnMasks, ExportChoice, ExportSetup, Which, export_masks};
 use touch2touch_pipeline::io::exchange::{Format, MANIFEST, list};
 use touch2touch_pipeline::io::images;
 use touch2touch_pipeline::io::masks::{FOLDER, MaskStore};
 use touch2touch_pipeline::job::JobCx;
-use touch2touch_pipeline::labels::{Operation, Recovered};
-use touch2touch_pipeline::steps::bundles::BundleInfo;
-use touch2touch_pipeline::steps::models::GenerateInput;
-use touch2touch_pipeline::steps::prediction::Prediction;
 
 /// What the child plays: `FOLDER` and the script's seed.
 const ROLE: &str = "TOUCH2TOUCH_KILL_TEST";
@@ -61,120 +51,6 @@ const ROUNDS: usize = 10;
 const PAIRS: u32 = 3;
 /// Acts of a script: more than fit in before the latest kill.
 const ACTS: usize = 400;
-
-/// A folder of pictures as the studio opens it, with labels on the disk; both fingers felt the same.
-struct Source {
-    live: LiveSource,
-    saves: bool,
-}
-
-impl DataSource for Source {
-    fn title(&self) -> &str {
-        self.live.title()
-    }
-    fn root(&self) -> Option<&Path> {
-        self.live.root()
-    }
-    fn index(&self) -> &Index {
-        self.live.index()
-    }
-    fn problems(&self) -> &[Problem] {
-        self.live.problems()
-    }
-    fn load(&self, pair: PairId) -> Result<Sample, TaskError> {
-        let mut sample = self.live.load(pair)?;
-        sample.pads[lab::LEFT] = sample.pads[lab::RIGHT].clone();
-        Ok(sample)
-    }
-    fn tool_mesh(&self, tool: &str) -> Result<TriMesh, TaskError> {
-        self.live.tool_mesh(tool)
-    }
-    fn load_labels(&self, name: &str) -> Result<PairLabels, TaskError> {
-        self.live.load_labels(name)
-    }
-    fn save_labels(&self, name: &str, labels: &PairLabels, deed: &Operation) -> Result<Option<PairLabels>, TaskError> {
-        if self.saves { self.live.save_labels(name, labels, deed) } else { Ok(None) }
-    }
-    fn plan_masks(&self, _: &BTreeMap<String, PairLabels>, _: ExportChoice) -> Result<Plan, TaskError> {
-        Err(TaskError::new("Export masks", "it is not tried here"))
-    }
-
-    fn export_masks(
-        &self,
-        changed: &BTreeMap<String, PairLabels>,
-        choice: ExportChoice,
-        folder: &Path,
-        cx: &JobCx,
-    ) -> Result<String, TaskError> {
-        if !self.saves {
-            return Ok(String::new());
-        }
-        // The pictures have a right finger only.
-        let mut right = BTreeMap::new();
-        for entry in &self.live.index().pairs {
-            let mut labels = match changed.get(&entry.name) {
-                Some(labels) => labels.clone(),
-                None => self.live.load_labels(&entry.name)?,
-            };
-            labels.masks.retain(|place, _| place.pad == lab::RIGHT);
-            right.insert(entry.name.clone(), labels);
-        }
-        self.live.export_masks(&right, choice, folder, cx)
-    }
-}
-
-/// Services without models and without settings of their own.
-struct Files {
-    saves: bool,
-}
-
-impl Services for Files {
-    fn open(&self, place: &Place) -> Result<Opened, TaskError> {
-        let live = open_source(place)?;
-        let index = live.index();
-        let mut reviews = BTreeMap::new();
-        for entry in &index.pairs {
-            let review = live.load_labels(&entry.name)?.review;
-            if review != Review::Todo {
-                reviews.insert(entry.name.clone(), review);
-            }
-        }
-        Ok(Opened {
-            source: Arc::new(Source { live, saves: self.saves }),
-            reviews,
-            notes: BTreeMap::new(),
-            recovered: Recovered::default(),
-        })
-    }
-    fn find_bundles(&self, _: &[PathBuf]) -> (Vec<BundleInfo>, Vec<TaskError>) {
-        Default::default()
-    }
-    fn predict(
-        &self,
-        _: &BundleInfo,
-        _: EngineChoice,
-        _: &GenerateConfig,
-        _: &[GenerateInput<'_>],
-        _: &JobCx,
-    ) -> Result<Vec<Prediction>, TaskError> {
-        Err(TaskError::new("Generate", "there is no model"))
-    }
-    fn mask_by_model(
-        &self,
-        _: &BundleInfo,
-        _: EngineChoice,
-        _: &DepthMap,
-        _: Option<f32>,
-    ) -> Result<ContactMask, TaskError> {
-        Err(TaskError::new("Mask", "there is no model"))
-    }
-    fn load_settings(&self) -> (Settings, Option<TaskError>) {
-        (Settings::default(), None)
-    }
-    fn save_settings(&self, _: &Settings) -> Result<(), TaskError> {
-        Ok(())
-    }
-}
 
 /// Where the exports of a data set go: beside it.
 fn exported(folder: &Path) -> PathBuf {
@@ -186,7 +62,8 @@ fn script(folder: &Path, seed: u64) -> Vec<Vec<Command>> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut acts = vec![vec![Command::Library(LibraryCommand::Select(PairId(rng.random_range(0..PAIRS))))]];
     while acts.len() < ACTS {
-        let finger = if rng.random() { lab::RIGHT } else { lab::LEFT };
+        // Pictures have a right finger only.
+        let finger = lab::RIGHT;
         acts.push(match rng.random_range(0..22) {
             0..11 => {
                 let tool = [MaskTool::Brush, MaskTool::Eraser, MaskTool::Lasso, MaskTool::Polygon, MaskTool::Rectangle]
@@ -250,31 +127,27 @@ fn script(folder: &Path, seed: u64) -> Vec<Vec<Command>> {
 
 /// An open folder in the application model.
 fn start(mut runtime: Runtime, folder: &Path) -> (Runtime, State) {
-    let mut state = State::default();
-    runtime.start(&mut state, Some(Place::Path(folder.to_owned())));
+    let settings = Settings { about_own_data: false, ..Settings::default() };
+    let mut state = State { settings, ..State::default() };
     let panes = [Pane::Measured, Pane::Masks].into_iter().collect();
-    runtime.tick(
-        &mut state,
-        vec![Command::View(ViewCommand::ShowPanes(panes)), Command::View(ViewCommand::ShowBothFingers(true))],
-    );
+    let open = LibraryCommand::Open(Place::Path(folder.to_owned()));
+    runtime.tick(&mut state, vec![open.into(), Command::View(ViewCommand::ShowPanes(panes))]);
     (runtime, state)
 }
 
 /// Whether the selected pair can be drawn on: everything a stroke starts from is there.
 fn ready(state: &State) -> bool {
-    let known = |finger| {
-        let mask = results::mask_in_force(state, ImprintSource::Measured, finger);
-        let imprint = results::imprint(state, ImprintSource::Measured, finger).ready().is_some();
-        imprint && !matches!(mask, Err(Lookup::Waiting | Lookup::Stale(_)))
-    };
-    state.entry().is_some() && state.document.is_editable(state.pair_name()) && lab::PADS.into_iter().all(known)
+    let mask = results::mask_in_force(state, ImprintSource::Measured, lab::RIGHT);
+    let imprint = results::imprint(state, ImprintSource::Measured, lab::RIGHT).ready().is_some();
+    let known = imprint && !matches!(mask, Err(Lookup::Waiting | Lookup::Stale(_)));
+    state.entry().is_some() && state.document.is_editable(state.pair_name()) && known
 }
 
 /// The child: acts, and says what is saved, until it is killed.
 fn act(role: &str) -> ! {
     let (folder, seed) = role.rsplit_once(' ').unwrap();
     let seed: u64 = seed.parse().unwrap();
-    let runtime = Runtime::threads(Arc::new(Files { saves: true }), Arc::new(|| {}));
+    let runtime = Runtime::threads(Arc::new(Services::with_config_folder(None)), Arc::new(|| {}));
     let (mut runtime, mut state) = start(runtime, Path::new(folder));
     let mut rng = ChaCha8Rng::seed_from_u64(!seed);
     // Not by `println!`, which the test harness may hold back.
@@ -316,18 +189,19 @@ fn plain(labels: &PairLabels) -> Labels {
     (labels.masks.iter().map(mask).collect(), labels.review)
 }
 
-/// What each pair says before the first act and after each one.
-fn played(folder: &Path, seed: u64) -> Vec<BTreeMap<String, Labels>> {
-    let (mut runtime, mut state) = start(Runtime::inline(Arc::new(Files { saves: false })), folder);
+/// What each pair says before the first act and after each one, played in a folder without exports.
+fn played(folder: &Path, seed: u64, acts: usize) -> Vec<BTreeMap<String, Labels>> {
+    let (mut runtime, mut state) = start(Runtime::inline(Arc::new(Services::with_config_folder(None))), folder);
     runtime.settle(&mut state);
-    let source = state.library.open.as_ref().unwrap().source.clone();
+    let source = Source::open(&Place::Path(folder.to_owned()), None).unwrap();
     let mut now: BTreeMap<String, Labels> = BTreeMap::new();
-    for entry in &source.index().pairs {
-        now.insert(entry.name.clone(), plain(&source.load_labels(&entry.name).unwrap()));
+    for entry in &source.dataset.index.pairs {
+        now.insert(entry.name.clone(), plain(&source.labels.load(&entry.name).unwrap()));
     }
     let mut all = vec![now.clone()];
-    for commands in script(folder, seed) {
+    for mut commands in script(folder, seed).into_iter().take(acts) {
         assert!(all.len() == 1 || ready(&state));
+        commands.retain(|command| !matches!(command, Command::Export(_)));
         runtime.tick(&mut state, commands);
         runtime.settle(&mut state);
         for (name, labels) in &state.document.labels {
@@ -336,6 +210,18 @@ fn played(folder: &Path, seed: u64) -> Vec<BTreeMap<String, Labels>> {
         all.push(now.clone());
     }
     all
+}
+
+/// Copies a folder with all that is in it.
+fn copy(from: &Path, to: &Path) {
+    std::fs::create_dir_all(to).unwrap();
+    for entry in std::fs::read_dir(from).unwrap().map(|entry| entry.unwrap()) {
+        let to = to.join(entry.file_name());
+        match entry.file_type().unwrap().is_dir() {
+            true => copy(&entry.path(), &to),
+            false => drop(std::fs::copy(entry.path(), to).unwrap()),
+        }
+    }
 }
 
 /// What a child said before its end.
@@ -392,14 +278,14 @@ fn kill_one(folder: &Path, seed: u64, acts: usize, after: Duration) -> Said {
 
 /// Reads the folder with the product's reader and compares; answers how many masks were newer than confirmed.
 fn compare(folder: &Path, played: &[BTreeMap<String, Labels>], said: &Said) -> usize {
-    let source = open_source(&Place::Path(folder.to_owned())).unwrap();
-    assert_eq!(source.problems(), [], "a file does not parse");
+    let source = Source::open(&Place::Path(folder.to_owned()), None).unwrap();
+    assert_eq!(source.problems, [], "a file does not parse");
     let store = MaskStore::in_folder(folder.join(FOLDER));
     for (pair, finger) in store.masks() {
         store.load(&pair, finger).unwrap();
     }
     let mut newer = 0;
-    for entry in &source.index().pairs {
+    for entry in &source.dataset.index.pairs {
         // Of a journal, a kill can only cut the last line short.
         let journal = store.journal(&entry.name).unwrap();
         let (whole, last) = journal.split_at(journal.iter().rposition(|b| *b == b'\n').map_or(0, |at| at + 1));
@@ -407,7 +293,7 @@ fn compare(folder: &Path, played: &[BTreeMap<String, Labels>], said: &Said) -> u
         // One that was cut short before is closed by the next one.
         let torn = whole.split(|b| *b == b'\n').filter(torn).count();
         assert!(torn < ROUNDS, "{torn} lines of a journal do not parse; the last: {:?}", String::from_utf8_lossy(last));
-        let (masks, review) = plain(&source.load_labels(&entry.name).unwrap());
+        let (masks, review) = plain(&source.labels.load(&entry.name).unwrap());
         let confirmed = said.saved.get(&entry.name).copied().unwrap_or(0);
         // A line may be on its way when the kill comes, an act is announced before it is begun.
         let may_be = &played[confirmed..=said.begun];
@@ -430,10 +316,11 @@ fn compare(folder: &Path, played: &[BTreeMap<String, Labels>], said: &Said) -> u
 
 /// One more export, which is whole, and takes away what kills left of others.
 fn finish(folder: &Path) {
-    let live = open_source(&Place::Path(folder.to_owned())).unwrap();
-    let source = Source { live, saves: true };
+    let source = Source::open(&Place::Path(folder.to_owned()), None).unwrap();
+    let masks = DrawnMasks { labels: &source.labels, changed: &BTreeMap::new() };
     let choice = ExportChoice { which: Which::Begun, ..ExportChoice::default() };
-    match source.export_masks(&BTreeMap::new(), choice, &exported(folder), &JobCx::unwatched()) {
+    let setup = ExportSetup { pairs: None, choice };
+    match export_masks(&source.dataset, &masks, &setup, &exported(folder), None, &JobCx::unwatched()) {
         Ok(_) => {
             let mut seen = Exports::default();
             look_at_exports(folder.parent().unwrap(), &mut seen);
@@ -512,8 +399,10 @@ fn no_confirmed_stroke_is_lost_to_a_kill() {
                         let seed = (series * ROUNDS + round) as u64;
                         let mut rng = ChaCha8Rng::seed_from_u64(seed + 1_000_000);
                         let (acts, after) = (rng.random_range(1..16), rng.random_range(0..30_000));
-                        let played = played(&folder, seed);
+                        let beside = tempfile::tempdir().unwrap();
+                        copy(&folder, &beside.path().join("set"));
                         let said = kill_one(&folder, seed, acts, Duration::from_micros(after));
+                        let played = played(&beside.path().join("set"), seed, said.begun);
                         let newer = compare(&folder, &played, &said);
                         look_at_exports(dir.path(), &mut exports.lock().unwrap());
                         let mut totals = totals.lock().unwrap();

@@ -44,7 +44,7 @@ const ENGINES: &[&str] = &["rten::", "ort::"];
 const MAX_LINES: usize = 700;
 
 /// The code of a file: no comment lines, and nothing that is only compiled for tests, wherever it stands.
-fn code(text: &str) -> String {
+pub(crate) fn code(text: &str) -> String {
     let mut out = Vec::new();
     let mut lines = text.lines();
     while let Some(line) = lines.next() {

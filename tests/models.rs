@@ -181,7 +181,6 @@ fn bundles_are_found_once_and_broken_ones_reported() {
     assert!(found.problems.iter().any(|p| p.what.contains("output.classes")));
 }
 
-#[cfg(feature = "onnx")]
 mod running {
     use std::ops::ControlFlow;
 
@@ -438,7 +437,6 @@ mod running {
 }
 
 /// The trial of a bundle in a second process, by the program itself.
-#[cfg(feature = "onnx")]
 mod trial {
     use std::process::Output;
 

@@ -10,7 +10,7 @@ use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::library::Place;
 use touch2touch::app::results;
 use touch2touch::app::runtime::Runtime;
-use touch2touch::app::services::live::LiveServices;
+use touch2touch::app::services::Services;
 use touch2touch::app::settings::{GenerateSettings, Settings};
 use touch2touch::app::state::State;
 use touch2touch_core::diffusion::Sampler;
@@ -48,7 +48,7 @@ fn labeled(dir: &Path) -> [PathBuf; 2] {
 /// one with seed 42.
 fn in_studio(home: &Path, [set, bundle]: &[PathBuf; 2]) -> usize {
     let mut state = State::default();
-    let services = LiveServices::with_config_folder(Some(home.to_owned()));
+    let services = Services::with_config_folder(Some(home.to_owned()));
     let settings = Settings {
         bundle_folders: vec![bundle.clone()],
         runtime: EngineChoice::Rten,

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use touch2touch::app::library::Place;
-use touch2touch::app::services::Services as _;
-use touch2touch::app::services::live::LiveServices;
+use touch2touch::app::services::Services;
+use touch2touch::app::source::Source;
 use touch2touch_core::grid::{Grid, Mask, RgbGrid};
 use touch2touch_core::label::Provenance;
 use touch2touch_core::rig::lab;
@@ -99,21 +99,22 @@ fn what_waits_is_taken_in_at_the_next_opening_and_merged_with_what_others_did() 
 fn the_studio_keeps_and_takes_in_through_its_services() {
     let dir = tempfile::tempdir().unwrap();
     let (root, ..) = set(dir.path());
-    let services = LiveServices::with_config_folder(Some(dir.path().join("config")));
+    let services = Services::with_config_folder(Some(dir.path().join("config")));
     let place = Place::Path(root.clone());
-    let opened = services.open(&place).unwrap();
-    let drawn = square(&opened.source.load_labels("a").unwrap(), 3);
+    let open = || Source::open(&place, services.waiting.as_deref()).unwrap();
+    let opened = open();
+    let drawn = square(&opened.labels.load("a").unwrap(), 3);
     // Where the folder of labels should be made lies a file: that stops everybody, root as well.
     std::fs::write(root.join(FOLDER), "in the way").unwrap();
-    opened.source.save_labels("a", &drawn, &Operation::named("stroke")).unwrap_err();
-    opened.source.keep_labels(&[unsaved("a", &drawn)], None).unwrap();
+    opened.labels.save("a", &drawn, &Operation::named("stroke")).unwrap_err();
+    opened.keep_labels(&[unsaved("a", &drawn)], None).unwrap();
     // It does not work yet: they go on waiting, and it is said.
-    assert!(!services.open(&place).unwrap().recovered.failed.is_empty() || cfg!(not(unix)));
+    assert!(!open().recovered.failed.is_empty() || cfg!(not(unix)));
     std::fs::remove_file(root.join(FOLDER)).unwrap();
-    let again = services.open(&place).unwrap();
+    let again = open();
     assert_eq!(again.recovered.pairs, ["a"]);
-    assert!(at(&again.source.load_labels("a").unwrap(), 3));
-    assert_eq!(again.reviews["a"], Review::InProgress);
+    assert!(at(&again.labels.load("a").unwrap(), 3));
+    assert_eq!(again.reviews.states["a"], Review::InProgress);
 }
 
 #[test]

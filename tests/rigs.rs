@@ -4,8 +4,7 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 use touch2touch::app::library::Place;
-use touch2touch::app::services::Services as _;
-use touch2touch::app::services::live::LiveServices;
+use touch2touch::app::source::Source;
 use touch2touch_core::grid::RgbGrid;
 use touch2touch_core::rig::Rig;
 use touch2touch_pipeline::io::dataset::{Dataset, OpenError, RIG_JSON};
@@ -124,10 +123,9 @@ fn the_rig_that_the_page_shows_is_one() {
 #[test]
 fn a_rig_with_one_spoilt_field_is_refused_and_says_what_to_do() {
     let dir = tempfile::tempdir().unwrap();
-    let services = LiveServices::with_config_folder(None);
     folder(dir.path(), sound().to_string().as_bytes());
     assert_eq!(Dataset::open(dir.path()).unwrap().rig.name, "Two fingers");
-    assert!(services.open(&Place::Path(dir.path().to_owned())).is_ok());
+    assert!(Source::open(&Place::Path(dir.path().to_owned()), None).is_ok());
 
     let text = sound().to_string().into_bytes();
     let mut files: Vec<(String, Vec<u8>, &str)> =
@@ -144,7 +142,7 @@ fn a_rig_with_one_spoilt_field_is_refused_and_says_what_to_do() {
         std::fs::write(dir.path().join(RIG_JSON), text).unwrap();
         let err = Dataset::open(dir.path()).expect_err(what);
         assert!(matches!(err, OpenError::Rig { .. }), "{what}: {err}");
-        let err = services.open(&Place::Path(dir.path().to_owned())).expect_err(what);
+        let err = Source::open(&Place::Path(dir.path().to_owned()), None).expect_err(what);
         let problem = Dataset::open(dir.path()).unwrap_err().to_problem();
         for shown in [err.to_string(), format!("{} {}", problem.what, problem.hint)] {
             for part in [RIG_JSON, "correct it, or remove it", said] {

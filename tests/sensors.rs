@@ -9,8 +9,7 @@ use touch2touch::app::command::{Command, Pane, PredictCommand, ViewCommand};
 use touch2touch::app::keys::{ImprintSource, ShiftMode};
 use touch2touch::app::library::Place;
 use touch2touch::app::runtime::Runtime;
-use touch2touch::app::services::Services as _;
-use touch2touch::app::services::live::LiveServices;
+use touch2touch::app::services::Services;
 use touch2touch::app::settings::Settings;
 use touch2touch::app::state::{Absent, Lookup, State};
 use touch2touch::app::tasks::Level;
@@ -42,7 +41,7 @@ fn report(output: &Output) -> Value {
 
 /// The studio on a place, with the bundles of a folder beside the shipped ones; waits until `done`.
 fn studio(place: Place, named: &str, home: &Path, mut done: impl FnMut(&State) -> bool) -> State {
-    let services = LiveServices::with_config_folder(Some(home.to_owned()));
+    let services = Services::with_config_folder(Some(home.to_owned()));
     let mut settings = Settings { bundle_folders: vec![bundle("")], ..Settings::default() };
     settings.generate.bundle = Some(named.to_owned());
     settings.generate.by_itself = false;

@@ -20,7 +20,6 @@ pub(crate) fn shared(folder: &str) -> Option<PathBuf> {
 }
 
 /// A graphics device. `REQUIRE_GPU=1` demands it.
-#[cfg(feature = "gui")]
 pub(crate) fn gpu() -> Option<touch2touch::gpu::Gpu> {
     touch2touch::gpu::Gpu::headless().map_or_else(|err| left_out(err, "REQUIRE_GPU"), Some)
 }
@@ -39,7 +38,6 @@ pub(crate) fn python() -> Option<PathBuf> {
 }
 
 /// The folder of an ONNX Runtime with OpenVINO, as the check script has installed it.
-#[cfg(feature = "onnx")]
 pub(crate) fn openvino() -> Option<String> {
     let named = std::env::var("TOUCH2TOUCH_OPENVINO").ok().filter(|dir| Path::new(dir).is_dir());
     named.or_else(|| left_out("TOUCH2TOUCH_OPENVINO names no folder with OpenVINO", "REQUIRE_ORT"))

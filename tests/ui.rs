@@ -1,7 +1,6 @@
 //! The studio driven by clicks and keys, without a window: the whole job on simulated touches in a temporary folder.
 //!
-//! Everything is the program's own (files, labels, settings, simulator, registration) but the generator, which is a
-//! quick double: what models do is tested where models are.
+//! Everything is the program's own: files, labels, settings, simulator, models, registration.
 
 mod label;
 mod layout;

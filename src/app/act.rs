@@ -16,7 +16,6 @@ use super::state::export::Output;
 use super::state::inspect::Inspected;
 use super::state::labels::Review;
 use super::state::library::Place;
-use super::state::settings::scene::{LayerLook, SceneLayer, SceneLook};
 use super::state::settings::{ColorRange, MaskTool};
 use super::state::tasks::TaskKind;
 use super::state::workbench::{Layer, SceneTool};
@@ -116,17 +115,8 @@ fn paint(paint: Paint) -> SettingsCommand {
     prefer(move |s| s.mask.paint = if s.mask.paint == paint { Paint::Contact } else { paint })
 }
 
-/// Shows the membrane's surface in place of its points, or the other way round.
-fn swap_membrane(look: &mut SceneLook) {
-    let (surface, points) = (look.layer(SceneLayer::Surface), look.layer(SceneLayer::Membrane));
-    let points = LayerLook { shown: surface.shown, ..points };
-    let surface = LayerLook { shown: !surface.shown, ..surface };
-    look.set(SceneLayer::Surface, surface);
-    look.set(SceneLayer::Membrane, points);
-}
-
 fn follow(state: &State) -> Option<Command> {
-    let folder = state.library.open.as_ref().is_some_and(|open| open.source.root().is_some());
+    let folder = state.library.open.as_ref().is_some_and(|open| open.source.dataset.root.is_some());
     when(folder, FollowCommand::Set(state.library.follow.is_none()))
 }
 
@@ -189,7 +179,7 @@ fn can_use(state: &State, network: Network) -> Option<Command> {
 
 /// True where every pair can be predicted and scored now.
 fn can_score_all(state: &State) -> bool {
-    results::setup_of_all(state).is_some()
+    results::evaluation_setup(state).is_some()
         && export::can_draw(state)
         && state.tasks.of_kind(TaskKind::Evaluate).is_none()
 }
@@ -209,13 +199,11 @@ fn nudge(state: &State, axis: PoseAxis, steps: f64) -> Option<Command> {
     when(in_hand(state), WorkbenchCommand::Nudge(axis, steps * axis.step()))
 }
 
-/// The command of Escape in the 3D panes: it gives up the pose in hand, then a measurement, then the point read.
+/// The command of Escape in the 3D panes: it gives up the pose in hand, then the tool, then the point read.
 fn escape(state: &State) -> Option<WorkbenchCommand> {
     let bench = &state.workbench;
     if bench.hand.is_some() {
         Some(WorkbenchCommand::RevertHand)
-    } else if !bench.marks.is_empty() {
-        Some(WorkbenchCommand::ClearMarks)
     } else if bench.tool != SceneTool::Look {
         Some(WorkbenchCommand::SetTool(SceneTool::Look))
     } else {
@@ -223,9 +211,9 @@ fn escape(state: &State) -> Option<WorkbenchCommand> {
     }
 }
 
-/// A command of the time machine, where it is on screen and shows a step for which it can do something.
+/// A command to the steps of a registration, where they are on screen and shows a step for which it can do something.
 fn inspect(state: &State, useful: impl Fn(Inspected<'_>) -> bool, command: InspectCommand) -> Option<Command> {
-    let shown = state.selection.panes.contains(&Pane::TimeMachine).then(|| results::inspected(state))??;
+    let shown = state.selection.panes.contains(&Pane::Steps).then(|| results::inspected(state))??;
     when(useful(shown), command)
 }
 

@@ -107,10 +107,8 @@ macro_rules! actions {
             state => when(learn::can_start(state, Network::Generator), LearnCommand::Start(Network::Generator));
         UseFit, Generate, "Use the fitted model", "Predicts with the model that was fitted to these pairs", [],
             state => can_use(state, Network::Generator);
-        EvaluateDataset, Generate, "Evaluate the data set", "Scores the chosen generators on the open data set, as the paper's results table does", [],
-            state => when(results::evaluation_setup(state).is_some() && state.tasks.of_kind(TaskKind::Evaluate).is_none(), EvaluateCommand::Start);
         PredictAll, Generate, "Predict all", "Predicts and scores every pair of the open data set with the chosen generators; what was scored before is not computed again", [],
-            state => when(can_score_all(state), EvaluateCommand::All);
+            state => when(can_score_all(state), EvaluateCommand::Start);
         ExportTable, Generate, "Export the results table…", "Writes the results table as CSV and JSON", [],
             state => when(state.table.result.is_some(), ViewCommand::Ui(UiRequest::PickTableFolder));
         CancelJobs, Generate, "Cancel", "Closes a dialog, drops a stroke, rejects a suggestion; else stops what is running", [plain(K::Escape)],
@@ -221,10 +219,6 @@ macro_rules! actions {
             state => accept_shown(state);
         RevertHand, Pose, "Drop the pose by hand", "Goes back to the registered pose", [],
             state => when(state.workbench.hand.is_some(), WorkbenchCommand::RevertHand);
-        MeasureDistance, Pose, "Measure distance", "Distance between two points you click in 3D", [plain(K::Y)],
-            state => toggle(state, SceneTool::Distance);
-        MeasureAngle, Pose, "Measure angle", "Angle at the second of three points you click in 3D", [shift(K::Y)],
-            state => toggle(state, SceneTool::Angle);
         StepBack, Pose, "Previous step", "Previous step of the registration", [plain(K::Comma)],
             state => inspect(state, |s| s.at > 0, InspectCommand::By(-1));
         StepForward, Pose, "Next step", "Next step of the registration", [plain(K::Period)],
@@ -233,14 +227,10 @@ macro_rules! actions {
             state => inspect(state, |s| s.at > 0, InspectCommand::Begin);
         LastStep, Pose, "Last step", "Where the registration ended", [shift(K::Period)],
             state => inspect(state, |s| !s.is_last(), InspectCommand::End);
-        PlaySteps, Pose, "Play the steps", "Plays the registration, or pauses; with the pointer in the time machine or a 3D view", [plain(K::Space)],
+        PlaySteps, Pose, "Play the steps", "Plays the registration, or pauses; with the pointer in the steps or a 3D view", [plain(K::Space)],
             state => inspect(state, |s| s.inspection.num_steps(s.run) > 1, InspectCommand::Play(!state.inspect.playing));
-        PinStep, Pose, "Compare this step", "Keeps this step on screen to compare others with it", [plain(K::J)],
-            state => inspect(state, |_| true, InspectCommand::Pin);
         OwnStarts, Pose, "All starts", "Back from a single start to all that the registration tries", [],
             state => when(state.inspect.start.is_some(), InspectCommand::Start(None));
-        Correspondences, Pose, "Show pull lines", "Lines from contact points to where they are pulled on the tool", [],
-            state => inspect(state, |_| true, InspectCommand::Lines(!state.inspect.lines));
         NextPoseEngine, Pose, "Next registration", "Cycles through the registration methods", [],
             _ => does(prefer(|s| s.registration = next_of(&s.registration.with_own_gate())));
 
@@ -276,22 +266,14 @@ macro_rules! actions {
             _ => does(prefer(|s| s.gel = next_of(&s.gel)));
         BothClouds, View, "Both clouds", "Shows measured and predicted points in each 3D view", [],
             state => does(WorkbenchCommand::SetBothClouds(!state.workbench.both_clouds));
-        CompareMode, View, "Next comparison", "Cycles through side by side, wipe, difference and 3D in Compare", [shift(K::F)],
-            _ => does(prefer(|s| s.versus_mut().mode = next_of(&s.versus_mut().mode)));
+        CompareMode, View, "Next comparison", "Switches between side by side and difference in Compare", [shift(K::F)],
+            _ => does(prefer(|s| s.compare_mut().mode = next_of(&s.compare_mut().mode)));
         SwapCompared, View, "Swap A and B", "Swaps A and B in Compare", [shift(K::R)],
-            _ => does(prefer(|s| *s.versus_mut() = s.versus_mut().clone().swapped()));
+            _ => does(prefer(|s| *s.compare_mut() = s.compare_mut().clone().swapped()));
         WindowOnly, View, "GelSlim window only", "Draws in 3D only what the GelSlims see", [plain(K::W)],
             _ => does(prefer(|s| s.scene.only_window ^= true));
-        MembraneSurface, View, "Membrane as a surface", "Draws the membrane in 3D as a surface, or as points", [],
-            _ => does(prefer(|s| swap_membrane(&mut s.scene)));
-        EyeDome, View, "Depth shading", "Darkens what lies behind its neighbors (eye-dome lighting)", [],
-            _ => does(prefer(|s| s.scene.eye_dome ^= true));
         Parallel, View, "Parallel projection", "No perspective in 3D", [plain(K::I)],
             _ => does(prefer(|s| s.scene.orthographic ^= true));
-        CopyCamera, View, "Copy the camera", "Copies the viewpoint of the 3D view under the pointer; Ctrl+V over another applies it", [],
-            _ => ui(UiRequest::CopyCamera);
-        LinkCameras, View, "Link cameras", "Moves both 3D views together", [],
-            _ => does(prefer(|s| s.cameras_linked ^= true));
         Footprint, View, "GelSlim window", "Outlines what the GelSlim sees, on bubble images", [],
             _ => does(prefer(|s| s.footprint_visible ^= true));
         SwitchTheme, View, "Dark theme", "Switches between the dark and the light theme", [],
@@ -315,9 +297,9 @@ macro_rules! actions {
         Screenshot, View, "Screenshot", "Saves a picture of the window to your Pictures folder", [plain(K::F12)],
             _ => ui(UiRequest::Screenshot);
         SavePane, View, "Save this pane", "Saves a picture of the pane under the pointer, with its bar and unit", [shift(K::F12)],
-            _ => ui(UiRequest::PanePicture { copied: false });
+            _ => ui(UiRequest::PanePicture { pane: None, copied: false });
         CopyPane, View, "Copy this pane", "Copies a picture of the pane under the pointer", [ctrl(K::F12)],
-            _ => ui(UiRequest::PanePicture { copied: true });
+            _ => ui(UiRequest::PanePicture { pane: None, copied: true });
         CopyHovered, View, "Copy the hovered value", "Copies the number under the pointer", [ctrl(K::C)],
             state => when(state.selection.hover.is_some(), ViewCommand::Ui(UiRequest::CopyHovered));
 
@@ -426,7 +408,7 @@ impl Action {
             Self::Generate => "predict prediction run inference diffusion",
             Self::FitPairs => "adapt calibrate tune finetune train",
             Self::TrainMasks | Self::StartTraining => "unet learn finetune tune segmentation",
-            Self::EvaluateDataset => "score metrics benchmark results table",
+            Self::PredictAll => "score metrics benchmark results table evaluate",
             Self::ExportTable => "csv json save results",
             Self::CancelJobs => "stop abort interrupt",
             Self::NextShift => "depth offset gain millimeters scale",
@@ -443,10 +425,8 @@ impl Action {
             Self::TryTools => "which tool wrong cad model identify rank recognize",
             Self::NextPoseEngine => "icp register method algorithm",
             Self::PoseTool => "hand gizmo drag manual move",
-            Self::MeasureDistance | Self::MeasureAngle => "ruler mm length degrees",
             Self::LockRange | Self::RangeOnce | Self::ResetRange => "colorbar colormap scale limits minimum maximum mm",
             Self::Fit => "zoom center home view",
-            Self::EyeDome => "edl shadow",
             Self::Parallel => "orthographic perspective camera",
             Self::Footprint => "rectangle outline crop",
             Self::SwitchTheme => "mode bright black white appearance",

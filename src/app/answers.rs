@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::effect::{Effect, Ended, NotSaved};
-use super::jobs::Lane;
+use super::effect::{Effect, NotSaved, TaskResult};
+use super::jobs::Worker;
 use super::keys::{DatasetSeq, Preview, Revision};
 use super::source::Followed;
 use super::state::State;
@@ -17,6 +17,7 @@ use super::{follow, labels, library, results, settings, tasks, workbench};
 use touch2touch_pipeline::error::{TaskError, TaskErrorKind};
 use touch2touch_pipeline::job::Progress;
 use touch2touch_pipeline::steps::bundles::BundleInfo;
+use touch2touch_pipeline::steps::recipe::Stage;
 
 /// An answer of the runtime.
 #[derive(Clone, Debug)]
@@ -35,10 +36,10 @@ pub enum Answer {
     Previewed(Ticket, Arc<Preview>),
     /// A job is under way.
     Progressed(Ticket, Progress),
-    /// An errand is done.
-    Ended(Ticket, Ended),
-    /// The system was asked to show a place.
-    Revealed,
+    /// A task is done.
+    TaskResult(Ticket, TaskResult),
+    /// Something is done of which nothing follows.
+    Done,
     /// It ended without a result.
     TaskFailed(Ticket, TaskError),
     /// A result that a pane asked for could not be made.
@@ -49,8 +50,6 @@ pub enum Answer {
     LabelsFailed(Box<NotSaved>),
     /// Labels are in another folder, as they were when that was asked for.
     LabelsKept(Vec<(String, Revision)>, PathBuf),
-    /// The settings are on the disk.
-    SettingsSaved,
     /// A job failed that is neither of a ticket nor of a request.
     JobFailed(TaskError),
 }
@@ -86,7 +85,7 @@ pub(super) fn step(state: &mut State, answer: Answer, effects: &mut Vec<Effect>)
                 task.progress = progress;
             }
         }
-        Answer::Ended(ticket, end) => ended(state, ticket, &end, effects),
+        Answer::TaskResult(ticket, end) => apply_result(state, ticket, &end, effects),
         Answer::TaskFailed(ticket, err) => failed_task(state, ticket, &err),
         Answer::RequestFailed(seq, request, err) if state.library.is_open(seq) => failed_request(state, *request, err),
         Answer::LabelsSaved(name, revision, merged) => {
@@ -102,23 +101,19 @@ pub(super) fn step(state: &mut State, answer: Answer, effects: &mut Vec<Effect>)
         Answer::LabelsKept(revisions, folder) => labels::unsaved::kept(state, revisions, folder, effects),
         Answer::JobFailed(err) => state.log.error(&err),
         // What came too late, or needs nothing.
-        Answer::Computed(..)
-        | Answer::RequestFailed(..)
-        | Answer::Previewed(..)
-        | Answer::SettingsSaved
-        | Answer::Revealed => {}
+        Answer::Computed(..) | Answer::RequestFailed(..) | Answer::Previewed(..) | Answer::Done => {}
     }
 }
 
-/// Lets follow what follows from the end of what a person started.
-fn ended(state: &mut State, ticket: Ticket, end: &Ended, effects: &mut Vec<Effect>) {
+/// Applies the result of a task.
+fn apply_result(state: &mut State, ticket: Ticket, end: &TaskResult, effects: &mut Vec<Effect>) {
     let task = tasks::forget(state, ticket);
     // What took minutes and is of another data set has nowhere to be shown.
-    if end.kind.lane() == Lane::Batch && task.is_none_or(|task| task.outdated) {
+    if end.kind.worker() == Worker::Batch && task.is_none_or(|task| task.outdated) {
         return;
     }
     let before = state.library.open.as_ref().map(|open| (open.seq, open.place.clone()));
-    end.land(state, effects);
+    end.apply_to(state, effects);
     if let Some(open) = &state.library.open
         && before.as_ref().is_none_or(|(seq, _)| *seq != open.seq)
     {
@@ -134,7 +129,7 @@ fn react(state: &mut State, request: &Request) {
             settings::follow_range(state);
             library::say_notes(state);
         }
-        Request::Cloud(_) => workbench::refresh_cost(state),
+        Request::Estimate(key) if key.stage >= Stage::Cloud => workbench::refresh_cost(state),
         Request::Run(key) => workbench::run_arrived(state, key),
         _ => {}
     }

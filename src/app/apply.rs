@@ -9,22 +9,18 @@ use super::{
 };
 use touch2touch_pipeline::labels::progress::Progress;
 
-macro_rules! dispatch {
-    ($( #[doc = $doc:literal] $room:ident($command:ident) in $module:ident, )*) => {
-        fn step(state: &mut State, command: Command, effects: &mut Vec<Effect>) {
-            match command { $( Command::$room(command) => $module::step(state, command, effects), )* }
-        }
-    };
-}
-rooms!(dispatch);
-
 /// Carries a command out. What has to happen outside the state comes back.
 ///
 /// Every command is legal in every state: one that makes no sense now changes nothing, or leaves a notice in the log.
 pub fn apply(state: &mut State, command: Command) -> Vec<Effect> {
     let (mut effects, before) = (Vec::new(), state.settings.workspace);
     let preferred = matches!(command, Command::Settings(_));
-    step(state, command, &mut effects);
+    macro_rules! dispatch {
+        ($( #[doc = $doc:literal] $room:ident($command:ident) in $module:ident, )*) => {
+            match command { $( Command::$room(command) => $module::step(state, command, &mut effects), )* }
+        };
+    }
+    rooms!(dispatch);
     if preferred {
         view::follow_workspace(state, before, &mut effects);
     }

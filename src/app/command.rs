@@ -11,7 +11,6 @@ pub use super::learn::LearnCommand;
 pub use super::library::LibraryCommand;
 pub use super::pane::Pane;
 pub use super::predict::PredictCommand;
-pub use super::services::Opened;
 pub use super::settings::SettingsCommand;
 pub use super::state::view::{CameraPreset, Hover, UiRequest};
 pub use super::tasks::TasksCommand;
@@ -32,9 +31,9 @@ macro_rules! rooms {
             Predict(PredictCommand) in predict,
             /// To masks, review states and accepted poses.
             Labels(LabelsCommand) in labels,
-            /// To the time machine.
+            /// To the steps of a registration.
             Inspect(InspectCommand) in inspect,
-            /// To layers, poses by hand and measurements.
+            /// To layers, poses by hand and points read.
             Workbench(WorkbenchCommand) in workbench,
             /// To the results table.
             Evaluate(EvaluateCommand) in evaluate,

@@ -18,7 +18,7 @@ pub(crate) const PREFETCH: usize = 4;
 pub fn demands(state: &State) -> Vec<Request> {
     let mut wants = Demands { state, list: Vec::new() };
     selection(&mut wants);
-    results::want_versus(&mut wants);
+    results::want_compared(&mut wants);
     results::want_thumbnails(&mut wants);
     results::want_doctor(&mut wants);
     neighbors(&mut wants);
@@ -59,27 +59,21 @@ fn selection(wants: &mut Demands<'_>) {
         if on_screen && state.needs(Demand::Ambiguity) {
             results::want_ambiguity(wants, finger, pair.finger(finger));
         }
-        let drawn = on_screen && (state.settings.mask_visible || state.needs(Demand::Masks));
-        if cloud_measured || (drawn && state.needs(Demand::Imprint(measured))) {
-            results::want_mask(wants, measured, finger);
-        }
-        if cloud_predicted || (drawn && state.needs(Demand::Imprint(predicted))) {
-            results::want_mask(wants, predicted, finger);
+    }
+    let drawn = state.settings.mask_visible || state.needs(Demand::Masks);
+    for (cloud, pose, source) in
+        [(cloud_measured, scene_measured, measured), (cloud_predicted, scene_predicted, predicted)]
+    {
+        let seen = drawn && state.needs(Demand::Imprint(source));
+        results::want_side(wants, source, [cloud, pose], |finger| seen && shown.contains(&finger));
+        if pose && state.document.stroke.is_none() {
+            workbench(wants, source);
         }
     }
-    // While the pen is down the cloud would be out of date before it is there.
-    if state.document.stroke.is_none() {
-        for (cloud, pose, source) in
-            [(cloud_measured, scene_measured, measured), (cloud_predicted, scene_predicted, predicted)]
-        {
-            if cloud && results::want_cloud(wants, source) && pose {
-                results::want_pose(wants, source);
-                workbench(wants, source);
-            }
-        }
-        if results::tool(state).ready().is_some() && results::cloud(state, state.inspect.source).ready().is_some() {
-            results::want_inspection(wants);
-        }
+    let posable =
+        || results::tool(state).ready().is_some() && results::cloud(state, state.inspect.source).ready().is_some();
+    if state.document.stroke.is_none() && posable() {
+        results::want_inspection(wants);
     }
     results::want_proposal(wants);
     results::want_predictions_ahead(wants);

@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::effect::{Access, Effect, Errand};
+use super::effect::{Access, Effect, Task};
 use super::keys::{DatasetSeq, ImprintSource};
 use super::learn::{self, AdaptPairs, LearnCommand, Network};
 use super::library::{self, LibraryCommand};
 use super::settings::{self, ColorRange, prefer};
-use super::source::DataSource;
+use super::source::Source;
 use super::state::State;
 use super::state::tasks::TaskKind;
 use super::{recipe, tasks};
@@ -36,11 +36,14 @@ pub enum DoctorCommand {
 
 pub(super) fn step(state: &mut State, command: DoctorCommand, effects: &mut Vec<Effect>) {
     match command {
-        DoctorCommand::Show(shown) => state.doctor.shown = shown && state.library.open.is_some(),
+        DoctorCommand::Show(shown) => {
+            state.close_dialogs();
+            state.doctor.shown = shown && state.library.open.is_some();
+        }
         DoctorCommand::Try => {
             let (Some(recipe), Some(open)) = (worth_recipe(state), &state.library.open) else { return };
             let source = open.source.clone();
-            let title = format!("Try the models on {}", source.title());
+            let title = format!("Try the models on {}", source.dataset.title);
             if tasks::start(state, title, TryModels { source, recipe }, effects).is_some() {
                 state.doctor.tried = true;
             }
@@ -94,8 +97,8 @@ fn carry_out(state: &mut State, cure: Cure, effects: &mut Vec<Effect>) {
         }
         Cure::Examine { .. } => {
             let Some(source) = state.library.open.as_ref().map(|open| open.source.clone()) else { return };
-            let errand = Examine { source, recipe: tried_recipe(state) };
-            tasks::start(state, TaskKind::Examine.name(), errand, effects);
+            let task = Examine { source, recipe: tried_recipe(state) };
+            tasks::start(state, TaskKind::Examine.name(), task, effects);
         }
     }
 }
@@ -127,7 +130,7 @@ fn tried_recipe(state: &State) -> Recipe {
 /// The recipe of trying the models now; `None` where no data, or no model, is there.
 fn worth_recipe(state: &State) -> Option<Recipe> {
     // The models come from what is built in.
-    state.library.open.as_ref()?.source.root()?;
+    state.library.open.as_ref()?.source.dataset.root.as_ref()?;
     let recipe = tried_recipe(state);
     (recipe.generator.is_some() || recipe.mask_model.is_some()).then_some(recipe)
 }
@@ -151,17 +154,16 @@ pub(crate) fn fitted_in_use(state: &State) -> Option<&str> {
 
 /// Tries the models on a sample.
 pub struct TryModels {
-    source: Arc<dyn DataSource>,
+    source: Arc<Source>,
     recipe: Recipe,
 }
 
-impl Errand for TryModels {
+impl Task for TryModels {
     type End = Option<Arc<Worth>>;
     const KIND: TaskKind = TaskKind::TryModels;
 
     fn run(self, access: &Access, cx: &JobCx) -> Result<Self::End, TaskError> {
-        let dataset = self.source.on_disk(Self::KIND.name())?;
-        Ok(doctor::worth(dataset, &self.recipe, access.services.models(), cx)?.map(Arc::new))
+        Ok(doctor::worth(&self.source.dataset, &self.recipe, &access.services.models, cx)?.map(Arc::new))
     }
 
     fn ended(worth: &Self::End, state: &mut State, _: &mut Vec<Effect>) {
@@ -171,19 +173,18 @@ impl Errand for TryModels {
 
 /// Examines every pair.
 pub struct Examine {
-    source: Arc<dyn DataSource>,
+    source: Arc<Source>,
     recipe: Recipe,
 }
 
-impl Errand for Examine {
+impl Task for Examine {
     type End = Arc<Examined>;
     const KIND: TaskKind = TaskKind::Examine;
 
     fn run(self, access: &Access, cx: &JobCx) -> Result<Self::End, TaskError> {
-        let dataset = self.source.on_disk(Self::KIND.name())?;
         let generating = self.recipe.generating().ok();
-        let generator = generating.map(|generating: Generating<'_>| (access.services.models(), generating));
-        doctor::examined(dataset, MOST_PAIRS, generator, cx).map(Arc::new)
+        let generator = generating.map(|generating: Generating<'_>| (&access.services.models, generating));
+        doctor::examined(&self.source.dataset, MOST_PAIRS, generator, cx).map(Arc::new)
     }
 
     fn ended(examined: &Self::End, state: &mut State, _: &mut Vec<Effect>) {
@@ -194,20 +195,19 @@ impl Errand for Examine {
 /// Has the data set read otherwise than it is stored, and opens it again.
 pub struct ReadOtherwise {
     seq: DatasetSeq,
-    source: Arc<dyn DataSource>,
+    source: Arc<Source>,
     list: String,
 }
 
-impl Errand for ReadOtherwise {
+impl Task for ReadOtherwise {
     /// The data set that it is of, the file that says so, and what it says.
     type End = (DatasetSeq, PathBuf, String);
     const KIND: TaskKind = TaskKind::ReadOtherwise;
 
     fn run(self, _: &Access, _: &JobCx) -> Result<Self::End, TaskError> {
         let what = Self::KIND.name();
-        let dataset = self.source.on_disk(what)?;
         let read_as = parse_list(&self.list).map_err(|why| TaskError::new(what, why))?;
-        Ok((self.seq, doubts::read_otherwise(dataset, &read_as)?, self.list))
+        Ok((self.seq, doubts::read_otherwise(&self.source.dataset, &read_as)?, self.list))
     }
 
     fn ended((seq, file, list): &Self::End, state: &mut State, effects: &mut Vec<Effect>) {

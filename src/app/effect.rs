@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::jobs::Lane;
+use super::jobs::Worker;
 use super::keys::{DatasetSeq, Revision};
 use super::results::preview::Onlooker;
-use super::services::SharedServices;
-use super::source::DataSource;
+use super::services::Services;
+use super::source::Source;
 use super::state::State;
 use super::state::labels::PairLabels;
 use super::state::settings::Settings;
@@ -33,32 +33,26 @@ pub struct LabelsToSave {
 }
 
 /// Labels that could not be written.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub struct NotSaved {
     /// The data set they are of.
-    pub source: Arc<dyn DataSource>,
+    pub source: Arc<Source>,
     /// The labels that were to be written.
     pub save: LabelsToSave,
     /// Why not.
     pub err: TaskError,
 }
 
-impl std::fmt::Debug for NotSaved {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "NotSaved({}, {})", self.save.name, self.err)
-    }
-}
-
-/// The access of an errand to what it does not hold itself.
+/// The access of a task to what it does not hold itself.
 pub struct Access {
     /// Files and models.
-    pub services: SharedServices,
+    pub services: Arc<Services>,
     /// Who looks at pictures of predictions on the way.
     pub onlooker: Onlooker,
 }
 
 /// A job that a person starts, with all that it needs. `tasks::start` lists it; the rest follows.
-pub trait Errand: Send + 'static {
+pub trait Task: Send + 'static {
     /// The value that it ends with.
     type End: Send + Sync + 'static;
 
@@ -70,9 +64,9 @@ pub trait Errand: Send + 'static {
         Self::KIND.name().to_owned()
     }
 
-    /// The lane that it runs on.
-    fn lane(&self) -> Lane {
-        Self::KIND.lane()
+    /// The worker that it runs on.
+    fn worker(&self) -> Worker {
+        Self::KIND.worker()
     }
 
     /// Does it.
@@ -85,71 +79,71 @@ pub trait Errand: Send + 'static {
     fn ended(end: &Self::End, state: &mut State, effects: &mut Vec<Effect>);
 }
 
-/// The body of an errand.
-type Doing = Box<dyn FnOnce(&Access, &JobCx) -> Result<Ended, TaskError> + Send>;
+/// The body of a task.
+type Doing = Box<dyn FnOnce(&Access, &JobCx) -> Result<TaskResult, TaskError> + Send>;
 /// The consequences of its end.
 type Follows = Arc<dyn Fn(&mut State, &mut Vec<Effect>) + Send + Sync>;
 
-/// An errand on its way to its lane.
-pub struct Started {
+/// A task on its way to its worker.
+pub struct TaskJob {
     /// The work that it does, for errors.
     pub what: String,
-    /// The lane that it runs on.
-    pub lane: Lane,
+    /// The worker that it runs on.
+    pub worker: Worker,
     /// The way.
     pub body: Doing,
 }
 
-impl Started {
-    /// An errand of any kind.
-    pub(super) fn new<E: Errand>(errand: E) -> Self {
-        let (what, lane) = (errand.what(), errand.lane());
-        Self { what, lane, body: Box::new(|access, cx| Ok(Ended::of::<E>(errand.run(access, cx)?))) }
+impl TaskJob {
+    /// A task of any kind.
+    pub(super) fn new<E: Task>(task: E) -> Self {
+        let (what, worker) = (task.what(), task.worker());
+        Self { what, worker, body: Box::new(|access, cx| Ok(TaskResult::of::<E>(task.run(access, cx)?))) }
     }
 }
 
-/// The end of an errand.
+/// The end of a task.
 #[derive(Clone)]
-pub struct Ended {
+pub struct TaskResult {
     /// The kind.
     pub kind: TaskKind,
     follows: Follows,
 }
 
-impl Ended {
+impl TaskResult {
     /// With what follows from it.
-    pub fn of<E: Errand>(end: E::End) -> Self {
+    pub fn of<E: Task>(end: E::End) -> Self {
         Self { kind: E::KIND, follows: Arc::new(move |state, effects| E::ended(&end, state, effects)) }
     }
 
     /// Lets that follow.
-    pub(super) fn land(&self, state: &mut State, effects: &mut Vec<Effect>) {
+    pub(super) fn apply_to(&self, state: &mut State, effects: &mut Vec<Effect>) {
         (self.follows)(state, effects);
     }
 }
 
-impl std::fmt::Debug for Ended {
+impl std::fmt::Debug for TaskResult {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "Ended({:?})", self.kind)
+        write!(f, "TaskResult({:?})", self.kind)
     }
 }
 
 /// Work that leaves the state.
 pub enum Effect {
     /// Do what a person started.
-    Start(Ticket, Started),
+    Start(Ticket, TaskJob),
     /// Tell it to stop.
     Cancel(Ticket),
     /// Follow the folder of a data set, or none any more.
-    Follow(Option<(DatasetSeq, Arc<dyn DataSource>)>),
+    Follow(Option<(DatasetSeq, Arc<Source>)>),
     /// Look for bundles.
     FindBundles(Vec<PathBuf>),
     /// Write the labels of a pair; a newer request for the same pair replaces a waiting one.
-    SaveLabels(Arc<dyn DataSource>, Box<LabelsToSave>),
+    SaveLabels(Arc<Source>, Box<LabelsToSave>),
     /// Write labels that could not be written where they belong to another folder.
     KeepLabels {
         /// The data.
-        source: Arc<dyn DataSource>,
+        source: Arc<Source>,
         /// The labels to be written.
         unsaved: Vec<Unsaved>,
         /// The folder; `None` = where they wait for the next opening.
@@ -167,7 +161,7 @@ pub enum Effect {
 
 impl Effect {
     /// Has labels wait for the next opening of their data set.
-    pub(super) fn keep_waiting(source: Arc<dyn DataSource>, unsaved: Vec<Unsaved>) -> Self {
+    pub(super) fn keep_waiting(source: Arc<Source>, unsaved: Vec<Unsaved>) -> Self {
         Self::KeepLabels { source, unsaved, folder: None, revisions: Vec::new() }
     }
 }

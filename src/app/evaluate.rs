@@ -1,14 +1,13 @@
 //! The room of the results table.
 
-pub(crate) use super::state::evaluate::GRASPS;
 pub use super::state::evaluate::ScoreChoice;
 
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::effect::{Access, Effect, Errand};
-use super::jobs::Lane;
-use super::source::DataSource;
+use super::effect::{Access, Effect, Task};
+use super::jobs::Worker;
+use super::source::Source;
 use super::state::State;
 use super::state::tasks::{Level, TaskKind};
 use super::{results, tasks};
@@ -21,14 +20,10 @@ use touch2touch_pipeline::scores::evaluate::{self, Evaluation, Setup};
 pub enum EvaluateCommand {
     /// Gives a generator a row, or none.
     Choose(Arc<str>, bool),
-    /// The number of grasps of each tool.
-    Grasps(Option<usize>),
     /// Shows what was published, or not.
     Published(bool),
-    /// Scores the open data set.
+    /// Predicts and scores every pair of the open data set.
     Start,
-    /// Predicts and scores every pair of it.
-    All,
     /// Writes the table into a folder.
     Export(PathBuf),
 }
@@ -42,15 +37,13 @@ pub(super) fn step(state: &mut State, command: EvaluateCommand, effects: &mut Ve
                 state.table.left_out.insert(bundle);
             }
         }
-        EvaluateCommand::Grasps(grasps) => state.table.grasps_per_tool = grasps.map(|n| n.max(1)),
         EvaluateCommand::Published(shown) => state.table.published = shown,
-        EvaluateCommand::Start => start(state, results::evaluation_setup(state), "Evaluate", effects),
-        EvaluateCommand::All => start(state, results::setup_of_all(state), "Predict all of", effects),
+        EvaluateCommand::Start => start(state, results::evaluation_setup(state), "Predict all of", effects),
         EvaluateCommand::Export(folder) => {
             let Some(evaluation) = state.table.result.clone() else { return };
             let published = state.table.published;
             let what = "Export the table";
-            let write = tasks::Write::new(Lane::Files, what, folder, move |folder, _, _| {
+            let write = tasks::Write::new(Worker::Files, what, folder, move |folder, _, _| {
                 let folder = evaluate::export(&evaluation, published, &folder)?;
                 let line = format!("Wrote evaluation.csv and .json to {}", folder.display());
                 Ok((line, folder))
@@ -64,23 +57,22 @@ pub(super) fn step(state: &mut State, command: EvaluateCommand, effects: &mut Ve
 fn start(state: &mut State, setup: Option<Setup>, what: &str, effects: &mut Vec<Effect>) {
     let (Some(setup), Some(open)) = (setup, &state.library.open) else { return };
     let source = open.source.clone();
-    let title = format!("{what} {}", source.title());
+    let title = format!("{what} {}", source.dataset.title);
     tasks::start(state, title, Score { source, setup }, effects);
 }
 
 /// Scores a data set.
 pub struct Score {
-    source: Arc<dyn DataSource>,
+    source: Arc<Source>,
     setup: Setup,
 }
 
-impl Errand for Score {
+impl Task for Score {
     type End = Arc<Evaluation>;
     const KIND: TaskKind = TaskKind::Evaluate;
 
     fn run(self, access: &Access, cx: &JobCx) -> Result<Self::End, TaskError> {
-        let dataset = self.source.on_disk(Self::KIND.name())?;
-        evaluate::evaluate(dataset, &self.setup, access.services.models(), cx).map(Arc::new)
+        evaluate::evaluate(&self.source.dataset, &self.setup, &access.services.models, cx).map(Arc::new)
     }
 
     fn ended(evaluation: &Self::End, state: &mut State, _: &mut Vec<Effect>) {
@@ -94,7 +86,7 @@ impl Errand for Score {
         }
         state.table.result = Some(evaluation.clone());
         if let Some(open) = &state.library.open {
-            state.table.take(evaluation, open.source.index());
+            state.table.take(evaluation, &open.source.dataset.index);
             state.reorder();
         }
     }

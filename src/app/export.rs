@@ -12,7 +12,7 @@ pub(crate) use setup::{can_draw, still_setup};
 use std::path::PathBuf;
 
 use super::effect::Effect;
-use super::jobs::Lane;
+use super::jobs::Worker;
 use super::labels::ImportMasks;
 use super::results;
 use super::state::State;
@@ -21,7 +21,8 @@ use super::state::view::UiRequest;
 use super::tasks::{self, Write};
 use crate::spatial;
 use touch2touch_pipeline::error::TaskError;
-use touch2touch_pipeline::export::ExportChoice;
+use touch2touch_pipeline::export::{DrawnMasks, ExportChoice, ExportSetup, export_masks};
+use touch2touch_pipeline::labels::Labels;
 use touch2touch_pipeline::still::still;
 
 /// A command to what is taken away.
@@ -45,9 +46,13 @@ pub enum ExportCommand {
 
 pub(super) fn step(state: &mut State, command: ExportCommand, effects: &mut Vec<Effect>) {
     match command {
-        ExportCommand::AskMasks(asking) => state.export.asking_masks = asking,
+        ExportCommand::AskMasks(asking) => {
+            state.close_dialogs();
+            state.export.asking_masks = asking;
+        }
         ExportCommand::SetMasks(choice) => state.export.masks = choice,
         ExportCommand::AskImport(from) => {
+            state.close_dialogs();
             state.export.imports += 1;
             let asked = state.export.imports;
             state.export.importing = from.map(|from| ImportForm { from, over_drawn: false, asked });
@@ -79,8 +84,11 @@ fn write(state: &mut State, output: Output, file: PathBuf, effects: &mut Vec<Eff
             let Some(source) = state.library.open.as_ref().map(|open| open.source.clone()) else { return };
             state.export.asking_masks = false;
             let (labels, choice) = (state.document.finished_labels(), state.export.masks);
-            let write = Write::new(Lane::Compute, "Export masks", file, move |folder, _, cx| {
-                Ok((source.export_masks(&labels, choice, &folder, cx)?, folder))
+            let write = Write::new(Worker::Compute, "Export masks", file, move |folder, _, cx| {
+                let setup = ExportSetup { pairs: None, choice };
+                let masks = DrawnMasks { labels: &Labels::of(&source.dataset), changed: &labels };
+                let (plan, _) = export_masks(&source.dataset, &masks, &setup, &folder, None, cx)?;
+                Ok((format!("Exported to {}: {}", folder.display(), plan.lines().join("; ")), folder))
             });
             tasks::start(state, "Export masks", write, effects);
         }
@@ -89,7 +97,7 @@ fn write(state: &mut State, output: Output, file: PathBuf, effects: &mut Vec<Eff
                 let err = TaskError::new("Export the pair", format!("it has no {} points", source.key()));
                 return state.log.error(&err.with_hint("Show it in 3D first."));
             };
-            let write = Write::new(Lane::Compute, "Export the pair", file, move |folder, _, _| {
+            let write = Write::new(Worker::Compute, "Export the pair", file, move |folder, _, _| {
                 let files = pair.write(&folder)?;
                 let names = files.iter().filter_map(|file| file.file_name()).map(|name| name.to_string_lossy());
                 let text = format!("Saved {}", names.collect::<Vec<_>>().join(", "));
@@ -102,10 +110,9 @@ fn write(state: &mut State, output: Output, file: PathBuf, effects: &mut Vec<Eff
             let source = open.source.clone();
             let png = asked.turntable.is_none() && file.extension().is_none();
             let file = if png { file.with_extension("png") } else { file };
-            let write = Write::new(Lane::Models, "Still", file, move |file, access, cx| {
+            let write = Write::new(Worker::Models, "Still", file, move |file, access, cx| {
                 let drawer = spatial::stills()?;
-                let dataset = source.on_disk("Still")?;
-                let done = still(dataset, &setup, access.services.models(), drawer, &file, cx)?;
+                let done = still(&source.dataset, &setup, &access.services.models, drawer, &file, cx)?;
                 let ([width, height], count) = (done.size_px, done.files.len());
                 let frames = if count == 1 { String::new() } else { format!("{count} frames of ") };
                 Ok((format!("Saved {} ({frames}{width} x {height} pixels)", file.display()), file))

@@ -30,7 +30,7 @@ fn set(state: &mut State, on: bool, effects: &mut Vec<Effect>) {
         return effects.push(Effect::Follow(None));
     }
     let Some(open) = &state.library.open else { return };
-    if open.source.root().is_none() {
+    if open.source.dataset.root.is_none() {
         let err = TaskError::new("Follow", "the demo has no folder that could be followed");
         return state.log.error(&err.with_hint("Open a folder first."));
     }

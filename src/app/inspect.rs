@@ -1,7 +1,7 @@
-//! The room of the time machine: moving about in what was recorded.
+//! The room of the steps of a registration: moving about in what was recorded.
 
+pub use super::state::inspect::Inspect;
 pub(crate) use super::state::inspect::Inspected;
-pub use super::state::inspect::{Inspect, Pin};
 
 use super::effect::Effect;
 use super::keys::ImprintSource;
@@ -9,7 +9,7 @@ use super::results;
 use super::state::State;
 use touch2touch_core::frames::PlanarPose;
 
-/// A command to the time machine.
+/// A command to the steps of a registration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum InspectCommand {
     /// Looks at the other imprint.
@@ -33,12 +33,6 @@ pub enum InspectCommand {
     End,
     /// Lets the steps go by, or stops them. At the end it begins again.
     Play(bool),
-    /// Keeps the step shown for comparison: in the first free place, else instead of the older one.
-    Pin,
-    /// Lets a kept step go.
-    Unpin(usize),
-    /// True where correspondences are drawn.
-    Lines(bool),
 }
 
 pub(super) fn step(state: &mut State, command: InspectCommand, _: &mut Vec<Effect>) {
@@ -92,13 +86,6 @@ pub(super) fn step(state: &mut State, command: InspectCommand, _: &mut Vec<Effec
                 state.inspect.at = Some(0);
             }
         }
-        InspectCommand::Pin => pin(state),
-        InspectCommand::Unpin(which) => {
-            if let Some(pin) = state.inspect.pins.get_mut(which) {
-                *pin = None;
-            }
-        }
-        InspectCommand::Lines(lines) => state.inspect.lines = lines,
     }
 }
 
@@ -112,24 +99,4 @@ fn go(state: &mut State, at: usize) {
 pub(super) fn rewind(state: &mut State) {
     let inspect = &mut state.inspect;
     (inspect.start, inspect.run, inspect.at, inspect.playing) = (None, None, None, false);
-}
-
-fn pin(state: &mut State) {
-    let (Some(shown), Some(pair)) = (results::inspected(state), state.pair_key()) else { return };
-    let new = Pin {
-        pair,
-        source: state.inspect.source,
-        registration: state.settings.registration,
-        run: shown.run,
-        at: shown.at,
-        grasp_from_object: shown.step.grasp_from_object,
-        cost_m2: shown.step.cost_m2,
-        kernel_m: shown.step.kernel_m,
-    };
-    let [first, second] = state.inspect.pins_of(state.pair_key());
-    state.inspect.pins = match (first, second) {
-        (None, second) => [Some(new), second],
-        (Some(first), None) => [Some(first), Some(new)],
-        (Some(_), Some(second)) => [Some(second), Some(new)],
-    };
 }

@@ -3,9 +3,9 @@
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::job::JobCx;
 
-/// A lane, on which jobs run. Each has its own threads, so that none waits for another kind of work.
+/// A worker, on which jobs run. Each has its own threads, so that none waits for another kind of work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, strum::EnumIter)]
-pub enum Lane {
+pub enum Worker {
     /// Reading and writing files: one thread, in order.
     Files,
     /// Computing.
@@ -16,7 +16,7 @@ pub enum Lane {
     Batch,
 }
 
-impl Lane {
+impl Worker {
     /// The name of its threads.
     pub fn name(self) -> &'static str {
         match self {
@@ -33,8 +33,8 @@ pub(crate) type Body<T> = Box<dyn FnOnce(&JobCx) -> Result<T, TaskError> + Send>
 
 /// A job that answers with a `T`. It holds its inputs: it needs the state no more.
 pub struct Job<T> {
-    /// The lane that it runs on.
-    pub lane: Lane,
+    /// The worker that it runs on.
+    pub worker: Worker,
     /// The work that it does, for errors.
     pub what: String,
     /// The way.
@@ -44,15 +44,10 @@ pub struct Job<T> {
 impl<T: 'static> Job<T> {
     /// A job of these parts.
     pub fn new(
-        lane: Lane,
+        worker: Worker,
         what: impl Into<String>,
         body: impl FnOnce(&JobCx) -> Result<T, TaskError> + Send + 'static,
     ) -> Self {
-        Self { lane, what: what.into(), body: Box::new(body) }
-    }
-
-    /// The job whose answer is `f` of this one's.
-    pub fn map<U: 'static>(self, f: impl FnOnce(T) -> U + Send + 'static) -> Job<U> {
-        Job::new(self.lane, self.what, move |cx| Ok(f((self.body)(cx)?)))
+        Self { worker, what: what.into(), body: Box::new(body) }
     }
 }

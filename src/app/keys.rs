@@ -5,9 +5,8 @@
 //! how each result is computed.
 
 pub mod dataset;
-pub mod imprint;
+pub mod estimate;
 pub mod inspection;
-pub mod pose;
 pub mod prediction;
 pub mod proposal;
 
@@ -19,9 +18,8 @@ pub use touch2touch_pipeline::labels::{ImprintSource, Revision};
 pub use touch2touch_pipeline::steps::mask::MaskRecipe;
 
 pub use dataset::{AboutKey, ImportForm, ImportPlanKey, MaskPlanKey, ToolKey, TrainPlanKey};
-pub use imprint::{ImprintKey, MaskKey, MaskVersion, MeanKey, VersusKey};
+pub use estimate::{ComparisonKey, EstimateKey, ImprintKey, MaskVersion, MeanKey, PoseBits, RunKey};
 pub use inspection::Inspection;
-pub use pose::{CloudDifferenceKey, CloudKey, PoseBits, PoseKey, RunKey};
 pub(crate) use prediction::Keyed;
 pub use prediction::{PredictionKey, Preview};
 pub use proposal::{CadPlace, Distances, DistancesKey, ProposalInputs, ProposalKey};
@@ -50,26 +48,16 @@ named! {
     PictureKey(TouchKey);
     /// The ambiguity of the GelSlim image of a touch.
     AmbiguityKey(TouchKey);
-    /// A prediction that nobody asked for. Whoever goes on to another pair has it stopped.
-    PrefetchKey(PredictionKey);
-    /// A prediction that is compared with something.
-    ComparedKey(PredictionKey);
     /// A prediction of a color sensor, as a picture.
     ColorKey(PredictionKey);
-    /// A prediction in meters.
-    MetersKey(PredictionKey, ShiftMode);
     /// Implausible things about the way of a prediction to meters.
     FlagsKey(PredictionKey, ShiftMode);
-    /// A pose without its proof, where the registration may ask for one: it is there at once.
-    ProvisionalPoseKey(PoseKey);
     /// The layers of a recorded registration from the registration's own starts.
-    LayersKey(PoseKey);
+    LayersKey(EstimateKey);
     /// The distances of the contact points from the model at a registered pose.
-    DeviationKey(PoseKey);
+    DeviationKey(EstimateKey);
     /// The tools of the data set, ranked for the touch that a pose is of.
-    RankingKey(PoseKey);
-    /// The steps of a recorded registration.
-    InspectionKey(RunKey);
+    RankingKey(EstimateKey);
 }
 
 /// Counts the data sets opened since the start: results of an earlier one never reach a later one.

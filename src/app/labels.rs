@@ -13,7 +13,7 @@ use std::borrow::Cow;
 use glam::DVec3;
 
 use super::effect::{Effect, LabelsToSave};
-use super::keys::{ImprintSource, PoseKey, Revision};
+use super::keys::{EstimateKey, ImprintSource, Revision};
 use super::state::history::Gesture;
 use super::state::tasks::Level;
 use super::state::{Lookup, State};
@@ -130,9 +130,9 @@ pub(super) fn step(state: &mut State, command: LabelsCommand, effects: &mut Vec<
 }
 
 /// The recipe of the pose that is shown of an imprint.
-fn shown_pose_key(state: &State, source: ImprintSource) -> Option<PoseKey> {
+fn shown_pose_key(state: &State, source: ImprintSource) -> Option<EstimateKey> {
     results::pose(state, source).shown()?;
-    let now = results::pose_key(state, source).ok().flatten().filter(|key| state.results.poses.contains(key));
+    let now = results::pose_key(state, source).ok().flatten().filter(|key| results::pose_of(state, key).is_some());
     now.or_else(|| results::latest(state, source)?.pose.clone())
 }
 

@@ -7,11 +7,11 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::effect::{Access, Effect, Errand};
+use super::effect::{Access, Effect, Task};
 use super::keys::ImprintSource;
 use super::pane::Pane;
 use super::settings::{self, prefer};
-use super::source::DataSource;
+use super::source::Source;
 use super::state::State;
 use super::state::labels::PairLabels;
 use super::state::learn::FOLDS;
@@ -61,7 +61,7 @@ pub(super) fn step(state: &mut State, command: LearnCommand, effects: &mut Vec<E
             let (title, learn) = match network {
                 Network::Generator => {
                     let Some(setup) = adapt_setup(state) else { return };
-                    (format!("Fit to {}", source.title()), Learn::Fit { source, setup: Box::new(setup) })
+                    (format!("Fit to {}", source.dataset.title), Learn::Fit { source, setup: Box::new(setup) })
                 }
                 Network::Masks => {
                     let Some(setup) = train_setup(state) else { return };
@@ -104,7 +104,7 @@ pub enum Learn {
     /// Fits a generator to pairs.
     Fit {
         /// The data.
-        source: Arc<dyn DataSource>,
+        source: Arc<Source>,
         /// The generator and the pairs.
         setup: Box<AdaptSetup>,
     },
@@ -113,7 +113,7 @@ pub enum Learn {
     /// Trains a mask model.
     Train {
         /// The data.
-        source: Arc<dyn DataSource>,
+        source: Arc<Source>,
         /// The labels of pairs, as far as they may not be on the disk yet.
         changed: BTreeMap<String, PairLabels>,
         /// The mask model and the time.
@@ -129,7 +129,7 @@ pub enum Learned {
     Masks(Arc<Trained>, BundleInfo),
 }
 
-impl Errand for Learn {
+impl Task for Learn {
     type End = Learned;
     const KIND: TaskKind = TaskKind::Learn;
 
@@ -143,27 +143,32 @@ impl Errand for Learn {
 
     fn run(self, access: &Access, cx: &JobCx) -> Result<Learned, TaskError> {
         let services = &access.services;
-        let (what, unfinished) = (self.what(), services.unfinished_folder().map(Into::into));
+        let unfinished = services.unfinished.clone();
         let adapted = match self {
             Self::Train { source, changed, setup } => {
-                let dataset = source.on_disk(&what)?;
-                let models = services.models_folder().ok_or_else(|| {
-                    TaskError::new(what, "this system names no folder for models")
+                let dataset = &source.dataset;
+                let models = services.models_folder.as_deref().ok_or_else(|| {
+                    TaskError::new(Network::Masks.what(), "this system names no folder for models")
                         .with_hint("Train with touch2touch masks train --out FOLDER.")
                 })?;
                 let setup = TrainSetup { out: train::new_folder(models, dataset), unfinished, ..*setup };
-                let masks = DrawnMasks { labels: &Labels::of(dataset), changed: &changed };
-                let trained = train::train(dataset, &masks, &setup, services.models(), cx)?;
+                let trained = train::train(
+                    dataset,
+                    &DrawnMasks { labels: &Labels::of(dataset), changed: &changed },
+                    &setup,
+                    &services.models,
+                    cx,
+                )?;
                 let bundle = bundles::open("Open the trained bundle", trained.bundle.as_path())?;
                 return Ok(Learned::Masks(Arc::new(trained), bundle));
             }
             Self::Keep(adapted) => adapt::keep(&adapted)?,
             Self::Fit { source, setup } => {
-                let dataset = source.on_disk(&what)?;
+                let dataset = &source.dataset;
                 // Among the models that the program looks for at its start.
                 let name = format!("fitted-to-{}", names::label(&dataset.title));
-                let out = services.models_folder().map(|folder| folder.join(name));
-                adapt::adapt(dataset, &AdaptSetup { out, unfinished, ..*setup }, services.models(), cx)?
+                let out = services.models_folder.as_ref().map(|folder| folder.join(name));
+                adapt::adapt(dataset, &AdaptSetup { out, unfinished, ..*setup }, &services.models, cx)?
             }
         };
         let open = |folder| bundles::open("Open the fitted bundle", folder);
@@ -218,7 +223,7 @@ fn add(state: &mut State, network: Network, bundle: &BundleInfo) {
 /// The pairs that a fit started now would take.
 pub(crate) fn pairs(state: &State) -> Box<dyn Iterator<Item = PairId> + '_> {
     let Some(open) = &state.library.open else { return Box::new(std::iter::empty()) };
-    let pairs = &open.source.index().pairs;
+    let pairs = &open.source.dataset.index.pairs;
     let all = (0..pairs.len() as u32).map(PairId);
     match state.learn.form.pairs {
         AdaptPairs::All => Box::new(all),

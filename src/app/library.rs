@@ -6,10 +6,9 @@ pub use super::state::library::{Follow, Library, Place, Sort, short_name};
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::effect::{Access, Effect, Errand};
+use super::effect::{Access, Effect, Task};
 use super::keys::DatasetSeq;
-use super::services::Opened;
-use super::source::DataSource;
+use super::source::Source;
 use super::state::State;
 use super::state::doctor::DoctorState;
 use super::state::evaluate::ScoreChoice;
@@ -24,7 +23,7 @@ use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::io::dataset::ToolUnit;
 use touch2touch_pipeline::job::JobCx;
 use touch2touch_pipeline::steps::bundles::{BundleInfo, BundleKind};
-use touch2touch_pipeline::steps::tool::UnitSet;
+use touch2touch_pipeline::steps::tool::{UnitSet, set_unit};
 
 /// A command to the data set and its list.
 #[derive(Clone, Debug)]
@@ -84,8 +83,8 @@ pub(super) fn step(state: &mut State, command: LibraryCommand, effects: &mut Vec
         }
         LibraryCommand::ReadToolAs { tool, unit, replacing } => {
             if let Some((source, seq)) = state.library.open.as_ref().map(|open| (open.source.clone(), open.seq)) {
-                let errand = ReadTool { seq, source, tool, unit, replacing };
-                tasks::start(state, errand.what(), errand, effects);
+                let task = ReadTool { seq, source, tool, unit, replacing };
+                tasks::start(state, task.what(), task, effects);
             }
         }
         LibraryCommand::SetFilter(filter) => {
@@ -129,8 +128,8 @@ fn open(state: &mut State, place: Place, effects: &mut Vec<Effect>) {
     let seq = state.library.last_seq;
     state.library.opening = Some(place.clone());
     state.library.failure = None;
-    let errand = Open { seq, place };
-    if let Some(task) = tasks::start(state, errand.what(), errand, effects) {
+    let task = Open { seq, place };
+    if let Some(task) = tasks::start(state, task.what(), task, effects) {
         task.opening = Some(seq);
     }
 }
@@ -142,8 +141,8 @@ pub struct Open {
     place: Place,
 }
 
-impl Errand for Open {
-    type End = (DatasetSeq, Place, Opened);
+impl Task for Open {
+    type End = (DatasetSeq, Place, Arc<Source>);
     const KIND: TaskKind = TaskKind::Open;
 
     fn what(&self) -> String {
@@ -151,14 +150,14 @@ impl Errand for Open {
     }
 
     fn run(self, access: &Access, _: &JobCx) -> Result<Self::End, TaskError> {
-        let opened = access.services.open(&self.place)?;
-        Ok((self.seq, self.place, opened))
+        let source = Source::open(&self.place, access.services.waiting.as_deref())?;
+        Ok((self.seq, self.place, Arc::new(source)))
     }
 
-    fn ended((seq, place, opened): &Self::End, state: &mut State, effects: &mut Vec<Effect>) {
+    fn ended((seq, place, source): &Self::End, state: &mut State, effects: &mut Vec<Effect>) {
         // Else a later opening was started meanwhile: this one is not wanted any more.
         if *seq == state.library.last_seq {
-            show(state, *seq, place.clone(), opened.clone(), effects);
+            show(state, *seq, place.clone(), source, effects);
         }
     }
 }
@@ -166,14 +165,14 @@ impl Errand for Open {
 /// Reads a tool's CAD file in another unit.
 pub struct ReadTool {
     seq: DatasetSeq,
-    source: Arc<dyn DataSource>,
+    source: Arc<Source>,
     tool: String,
     unit: ToolUnit,
     /// The unit that the file beside it says now, as the person was told.
     replacing: Option<String>,
 }
 
-impl Errand for ReadTool {
+impl Task for ReadTool {
     /// The data set that it is of, and what was done.
     type End = (DatasetSeq, UnitSet);
     const KIND: TaskKind = TaskKind::ReadTool;
@@ -183,7 +182,7 @@ impl Errand for ReadTool {
     }
 
     fn run(self, _: &Access, _: &JobCx) -> Result<Self::End, TaskError> {
-        Ok((self.seq, self.source.set_tool_unit(&self.tool, self.unit, self.replacing.as_deref())?))
+        Ok((self.seq, set_unit(&self.source.dataset, &self.tool, self.unit, self.replacing.as_deref())?))
     }
 
     /// Has what failed for it tried again.
@@ -306,7 +305,7 @@ pub(super) fn say_notes(state: &mut State) {
 }
 
 /// Shows a data set that was opened.
-fn show(state: &mut State, seq: DatasetSeq, place: Place, opened: Opened, effects: &mut Vec<Effect>) {
+fn show(state: &mut State, seq: DatasetSeq, place: Place, source: &Arc<Source>, effects: &mut Vec<Effect>) {
     labels::end_stroke(state, effects);
     // What is being written goes on; what could not be would be forgotten.
     let failed = state.document.failed.clone();
@@ -328,21 +327,21 @@ fn show(state: &mut State, seq: DatasetSeq, place: Place, opened: Opened, effect
     state.table.scores = Arc::default();
     state.learn = state.learn.emptied();
     // Somebody's own folder is said what it is, unless it was open when the window was closed.
-    let own = opened.source.root().is_some() && !resumed;
+    let own = source.dataset.root.is_some() && !resumed;
     let shown = if same_place { state.doctor.shown } else { own && state.settings.about_own_data };
     state.doctor = DoctorState { shown, ..DoctorState::default() };
     state.history.clear();
     state.tasks.failed.clear();
     state.document = Document {
-        reviews: opened.reviews,
-        notes: opened.notes,
+        reviews: source.reviews.states.clone(),
+        notes: source.reviews.notes.clone(),
         marked: true,
         last_revision: state.document.last_revision,
         ..Document::default()
     };
     state.library.opening = None;
-    let tools = opened.source.index().tools();
-    state.library.open = Some(OpenDataset { seq, place: place.clone(), source: opened.source.clone(), tools });
+    let tools = source.dataset.index.tools();
+    state.library.open = Some(OpenDataset { seq, place: place.clone(), source: source.clone(), tools });
     if !same_place {
         state.library.filter.clear();
         state.library.tool = None;
@@ -350,12 +349,12 @@ fn show(state: &mut State, seq: DatasetSeq, place: Place, opened: Opened, effect
     }
     state.reorder();
     if resumed {
-        let pads = opened.source.rig().pads().len();
+        let pads = source.dataset.rig.pads().len();
         state.selection.finger = PadId::new(last.finger.min(pads.saturating_sub(1)));
         state.selection.both_fingers = last.both_fingers;
     }
     let kept = before.filter(|_| same_place).or(resumed.then_some(last.pair)).and_then(|name| {
-        let at = opened.source.index().pairs.iter().position(|entry| entry.name == name)?;
+        let at = source.dataset.index.pairs.iter().position(|entry| entry.name == name)?;
         u32::try_from(at).ok().map(PairId)
     });
     state.selection.pair = kept.or_else(|| state.library.order.first().copied());
@@ -363,22 +362,21 @@ fn show(state: &mut State, seq: DatasetSeq, place: Place, opened: Opened, effect
     state.selection.hover_point = None;
     state.workbench.leave_pair();
     inspect::rewind(state);
-    state.inspect.pins = [None, None];
-    let (pairs, problems) = (opened.source.index().pairs.len(), opened.source.problems().len());
+    let (pairs, problems) = (source.dataset.index.pairs.len(), source.problems.len());
     let (level, hint) = match problems {
         0 => (Level::Info, None),
         _ => (Level::Warning, Some("The list of problems says which files, and what to do.".to_owned())),
     };
     let text = match problems {
-        0 => format!("{}: {pairs} pairs", opened.source.title()),
-        n => format!("{}: {pairs} pairs, {n} problem{}", opened.source.title(), if n == 1 { "" } else { "s" }),
+        0 => format!("{}: {pairs} pairs", source.dataset.title),
+        n => format!("{}: {pairs} pairs, {n} problem{}", source.dataset.title, if n == 1 { "" } else { "s" }),
     };
     state.log.push(level, text, None, hint);
-    if let Some(text) = opened.recovered.text() {
+    if let Some(text) = source.recovered.text() {
         let hint = "Undo takes them back, pair by pair.";
         state.log.push(Level::Warning, text, None, Some(hint.into()));
     }
-    opened.recovered.failed.iter().for_each(|err| state.log.error(err));
+    source.recovered.failed.iter().for_each(|err| state.log.error(err));
     remember(state, &place, effects);
 }
 

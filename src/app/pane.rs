@@ -46,7 +46,7 @@ pub enum Kind {
     /// Imprints of one side.
     Imprint(ImprintSource),
     /// Two imprints.
-    Versus,
+    Compare,
     /// 3D views of the sides that are chosen.
     Scene,
     /// Steps that can be played.
@@ -83,7 +83,7 @@ pub enum Demand {
     /// Implausible things about a prediction's way to meters.
     Flags,
     /// Any two imprints against each other.
-    Versus,
+    Compare,
     /// Cloud and pose in 3D, of the sides that are chosen.
     Scene,
     /// The poses of both sides.
@@ -132,19 +132,19 @@ macro_rules! panes {
                     at [Inspect Top(3), Align Top(2), Label Top(1), Evaluate Bottom(2), Adapt Bottom(2)]
                 }
             }
-            versus { Compare {
-                    "Compare", "Any two imprints of this touch: side by side, wipe, difference, 3D",
-                    Versus, needs [Versus], at [Inspect Bottom(1), Align Top(2), Evaluate Bottom(3), Adapt Bottom(3)]
+            compare { Compare {
+                    "Compare", "Any two imprints of this touch: side by side, or their difference",
+                    Compare, needs [Compare], at [Inspect Bottom(1), Align Top(2), Evaluate Bottom(3), Adapt Bottom(3)]
             } }
-            timemachine { TimeMachine {
-                "Time machine", "The registration step by step",
+            steps { Steps {
+                "Steps of the registration" as "Steps", "The registration step by step",
                 Steps, needs [Steps], at [Align Bottom(1)]
             } }
             masks {
                 Masks { "Mask", "Edit the contact mask", Form, needs [Masks], at [Label Right(1)] }
             }
             results { Results {
-                "Results", "The paper's results table of the open data set", Form, needs [],
+                "Results", "Scores of every generator, and of every pair", Form, needs [],
                 at [Evaluate Top(1)]
             } }
             adapt { Adapt {
@@ -152,9 +152,6 @@ macro_rules! panes {
                 Form, needs [Training],
                 at [Adapt Top(1)]
             } }
-            table {
-                Table { "All metrics", "The scores of all pairs by every source", Form, needs [], at [Evaluate Top(1)] }
-            }
             log { Log {
                 "Log", "Messages so far", Form, needs [],
                 at [Inspect Right(2), Align Right(2), Label Right(2), Evaluate Right(1), Adapt Right(1)]
@@ -200,7 +197,7 @@ macro_rules! define {
             /// The kind of what it shows.
             pub fn kind(self) -> Kind {
                 use ImprintSource::{Measured, Predicted};
-                use Kind::{Color, Form, Imprint, Scene, Steps, Versus};
+                use Kind::{Color, Compare, Form, Imprint, Scene, Steps};
                 match self { $($( Self::$pane => $kind, )*)* }
             }
 
@@ -208,8 +205,8 @@ macro_rules! define {
             pub fn needs(self) -> &'static [Demand] {
                 use ImprintSource::{Measured, Predicted};
                 use Demand::{
-                    Ambiguity, Comparison, Flags, Imprint, Masks, Pair, Poses, Scene,
-                    Steps, Thumbnails, Training, Versus,
+                    Ambiguity, Compare, Comparison, Flags, Imprint, Masks, Pair, Poses, Scene,
+                    Steps, Thumbnails, Training,
                 };
                 match self { $($( Self::$pane => &[$($need),*], )*)* }
             }

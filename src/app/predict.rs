@@ -6,10 +6,10 @@ pub use refit::Refit;
 
 use std::sync::Arc;
 
-use super::effect::{Access, Effect, Errand};
+use super::effect::{Access, Effect, Task};
 use super::keys::{Keyed, PredictionKey};
 use super::results::prediction;
-use super::source::DataSource;
+use super::source::Source;
 use super::state::tasks::TaskKind;
 use super::state::{Absent, State};
 use super::{recipe, results, settings, tasks};
@@ -96,8 +96,8 @@ fn start(state: &mut State, fingers: &[PadId], effects: &mut Vec<Effect>) {
     }
     let names: Vec<Text> = recipes.iter().map(|recipe| state.finger_name(recipe.touch.finger)).collect();
     let title = format!("Generate {} {}", state.pair_name(), names.join(" and "));
-    let errand = Generate { recipes: recipes.clone(), bundle, source, sample };
-    if let Some(task) = tasks::start(state, title, errand, effects) {
+    let task = Generate { recipes: recipes.clone(), bundle, source, sample };
+    if let Some(task) = tasks::start(state, title, task, effects) {
         task.recipes = recipes;
     }
 }
@@ -106,12 +106,12 @@ fn start(state: &mut State, fingers: &[PadId], effects: &mut Vec<Effect>) {
 pub struct Generate {
     recipes: Vec<PredictionKey>,
     bundle: BundleInfo,
-    source: Arc<dyn DataSource>,
+    source: Arc<Source>,
     /// The pair, if it is loaded.
     sample: Option<Arc<Sample>>,
 }
 
-impl Errand for Generate {
+impl Task for Generate {
     type End = Keyed;
     const KIND: TaskKind = TaskKind::Generate;
 
@@ -122,7 +122,7 @@ impl Errand for Generate {
     fn run(self, access: &Access, cx: &JobCx) -> Result<Keyed, TaskError> {
         let Self { recipes, bundle, source, sample } = self;
         let onlooker = Some(access.onlooker.clone());
-        prediction::generate(&*access.services, recipes, &bundle, &*source, sample, cx, onlooker)
+        prediction::generate(&access.services, recipes, &bundle, &source, sample, cx, onlooker)
     }
 
     fn ended(made: &Keyed, state: &mut State, _: &mut Vec<Effect>) {

@@ -6,12 +6,13 @@
 use std::sync::Arc;
 
 use super::jobs::Job;
-use super::services::SharedServices;
+use super::services::Services;
 use super::state::State;
 use super::state::results::{Cached, Computed, Key, Request, table};
 use touch2touch_pipeline::error::TaskError;
 
-pub(crate) mod cloud;
+pub(crate) mod compare;
+pub(crate) mod estimate;
 pub(crate) mod imprint;
 pub(crate) mod labels;
 pub(crate) mod manual;
@@ -19,7 +20,6 @@ pub(crate) mod mask;
 pub(crate) mod on_screen;
 pub(crate) mod outdated;
 pub(crate) mod plans;
-pub(crate) mod pose;
 pub(crate) mod prediction;
 pub(crate) mod preview;
 pub(crate) mod proposal;
@@ -28,17 +28,18 @@ pub(crate) mod sample;
 pub(crate) mod scores;
 pub(crate) mod shown;
 pub(crate) mod tool;
-pub(crate) mod versus;
 
-pub use cloud::cloud;
-pub(crate) use cloud::{automatic_cloud, cloud_key, latest, want_cloud};
+pub use compare::{comparison, subject, subject_key, subject_pose, subjects_compared};
+pub(crate) use compare::{want_compared, want_comparison};
+pub use estimate::{cloud, pose, pose_key, pose_of};
+pub(crate) use estimate::{cloud_key, latest, registered, want_side};
 pub(crate) use imprint::want_imprint;
 pub use imprint::{flags, imprint, predicted_color};
 pub use manual::{accepted, accepted_elsewhere, by_hand, manual_begins, shown_pose};
 pub(crate) use manual::{shown_imprint, sides_apart};
 pub use mask::{MaskInForce, drawn_mask, mask_in_force, mask_places};
 pub(crate) use mask::{
-    automatic_mask, automatic_provenance, drawn_mask_on, mask_of, mask_place, mask_recipe, want_mask,
+    automatic_mask, automatic_provenance, awaits_tool, drawn_mask_on, mask_place, mask_recipe, mask_version, want_mask,
 };
 pub use on_screen::proposes;
 pub(crate) use on_screen::{fingers_to_generate, shows_cloud, shows_deviation, shows_layers, shows_steps};
@@ -47,8 +48,6 @@ pub(crate) use plans::{
     doctor_key, import_setup, train_plan_key, want_doctor, want_import_plan, want_mask_plan, want_train_plan,
 };
 pub use plans::{import_plan_key, mask_plan_key};
-pub use pose::{pose, pose_key, provisional_pose};
-pub(crate) use pose::{registered, want_pose};
 pub use prediction::can_generate;
 pub(crate) use prediction::{
     can_start, keep_prediction, prefetch, want_other_finger, want_predictions_ahead, want_stored,
@@ -61,18 +60,16 @@ pub(crate) use registration::{inspected_in, run_key, want_deviation, want_inspec
 pub use sample::{ambiguity, bubble, gelslim, sample, thumbnail, touch, truth};
 pub(crate) use sample::{gone, want_ambiguity, want_thumbnails};
 pub use scores::evaluated;
-pub(crate) use scores::{evaluation_setup, setup_of_all};
+pub(crate) use scores::evaluation_setup;
 pub use shown::{chosen, imprint_key, shown, worked_on};
 pub(crate) use shown::{imprint_of, pick, picked};
 pub use tool::{tool, tool_name};
 pub(crate) use tool::{tool_key, want_tool};
-pub use versus::{comparison, subject, subject_key, subject_pose, subjects_apart, subjects_compared};
-pub(crate) use versus::{pose_absent, subject_points, want_comparison, want_versus};
 
 /// A key that says how its result is computed.
 pub(crate) trait Computes: Key {
     /// The job, with its inputs gathered; `None` if one is not there (any more).
-    fn job(&self, state: &State, services: &SharedServices) -> Option<Job<Self::Value>>;
+    fn job(&self, state: &State, services: &Arc<Services>) -> Option<Job<Self::Value>>;
 
     /// Asks for it where a pane on screen needs it and nothing else asks.
     fn wanted(_wants: &mut Demands<'_>) {}
@@ -97,10 +94,10 @@ macro_rules! computing {
         }
 
         /// The job of a request; `None` if an input is not there (any more).
-        pub(super) fn job(request: &Request, state: &State, services: &SharedServices) -> Option<Job<Computed>> {
+        pub(super) fn job(request: &Request, state: &State, services: &Arc<Services>) -> Option<Job<Computed>> {
             match request { $( Request::$variant(key) => {
-                let done = key.clone();
-                Some(key.job(state, services)?.map(move |value| Computed::$variant(done, Arc::new(value))))
+                let (done, Job { worker, what, body }) = (key.clone(), key.job(state, services)?);
+                Some(Job::new(worker, what, move |cx| Ok(Computed::$variant(done, Arc::new(body(cx)?)))))
             } )* }
         }
 

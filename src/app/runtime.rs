@@ -1,24 +1,24 @@
-//! [`Runtime`]: turns effects and requests into jobs on lanes, and their answers into commands.
+//! [`Runtime`]: turns effects and requests into jobs on workers, and their answers into commands.
 
 mod follow;
-mod lanes;
 mod perform;
+mod workers;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::{Duration, Instant};
 
-use lanes::{Event, Lanes};
+use workers::{Event, Workers};
 
 use super::answers::Answer;
 use super::apply::apply;
 use super::command::{Command, LabelsCommand, LibraryCommand, UnsavedCommand};
 use super::effect::Effect;
-use super::jobs::Lane;
+use super::jobs::Worker;
 use super::keys::{DatasetSeq, Preview, TouchKey};
 use super::results::preview::PreviewRequest;
-use super::services::SharedServices;
+use super::services::Services;
 use super::state::State;
 use super::state::library::Place;
 use super::state::results::Request;
@@ -58,8 +58,8 @@ pub(super) enum JobId {
 
 /// Runs what `apply` wants done and what the panes want to show.
 pub struct Runtime {
-    services: SharedServices,
-    lanes: Lanes,
+    services: Arc<Services>,
+    workers: Workers,
     events: Receiver<Event>,
     sender: Sender<Event>,
     /// Progress by ticket, only the latest.
@@ -75,25 +75,26 @@ pub struct Runtime {
     retry_at: Option<Instant>,
     /// Folders that labels were kept in so far: each such job is one of its own.
     kept: usize,
+    threaded: bool,
 }
 
 impl Runtime {
     /// A runtime with its own threads; `wake` is called when there is news.
-    pub fn threads(services: SharedServices, wake: Wake) -> Self {
+    pub fn threads(services: Arc<Services>, wake: Wake) -> Self {
         Self::new(services, wake, true)
     }
 
     /// A runtime without threads: jobs wait until [`Runtime::run_one`] or [`Runtime::settle`] runs them here.
-    pub fn inline(services: SharedServices) -> Self {
+    pub fn inline(services: Arc<Services>) -> Self {
         Self::new(services, Arc::new(|| {}), false)
     }
 
-    fn new(services: SharedServices, wake: Wake, threaded: bool) -> Self {
+    fn new(services: Arc<Services>, wake: Wake, threaded: bool) -> Self {
         let (sender, events) = channel();
-        let lanes = Lanes::new(threaded, &sender, &wake);
+        let workers = Workers::new(threaded, &sender, &wake);
         Self {
             services,
-            lanes,
+            workers,
             events,
             sender,
             progress: Arc::default(),
@@ -104,6 +105,7 @@ impl Runtime {
             follower: None,
             retry_at: None,
             kept: 0,
+            threaded,
         }
     }
 
@@ -130,7 +132,7 @@ impl Runtime {
             }
             self.run(state, answer, &mut ui);
             // Only now: until its result is in the state, a request counts as running and is not started again.
-            self.lanes.forget(&id);
+            self.workers.forget(&id);
         }
         let progress = std::mem::take(&mut *lock(&self.progress));
         for (ticket, progress) in progress {
@@ -153,7 +155,7 @@ impl Runtime {
             self.run(state, Answer::Demanded(wanted), &mut ui);
         }
         let services = &self.services;
-        self.lanes.demand(&state.tasks.demanded, |request| {
+        self.workers.demand(&state.tasks.demanded, |request| {
             Some((state.library.open.as_ref()?.seq, results::job(request, state, services)?))
         });
         ui
@@ -171,7 +173,7 @@ impl Runtime {
             self.run(state, LabelsCommand::Unsaved(UnsavedCommand::Retry), ui);
         }
         if due || self.retry_at.is_none() {
-            self.retry_at = now.checked_add(self.services.retry_after());
+            self.retry_at = now.checked_add(self.services.retry_after);
         }
     }
 
@@ -184,7 +186,7 @@ impl Runtime {
     /// of their data set. Call [`Runtime::tick`] no more.
     pub fn finish(&mut self, state: &mut State) {
         self.follow(None);
-        self.lanes.close();
+        self.workers.close();
         let mut keep: Vec<Effect> = Vec::new();
         while let Ok(Event { answer, .. }) = self.events.try_recv() {
             keep.extend(apply(state, answer.into()).into_iter().filter(|e| matches!(e, Effect::KeepLabels { .. })));
@@ -205,24 +207,24 @@ impl Runtime {
         state.document.unsaved.clear();
     }
 
-    /// Runs the first waiting job of a lane here and now; `false` if none waits. Only without threads.
-    pub fn run_one(&mut self, lane: Lane) -> bool {
-        self.lanes.run_one(lane)
+    /// Runs the first waiting job of a worker here and now; `false` if none waits. Only without threads.
+    pub fn run_one(&mut self, worker: Worker) -> bool {
+        self.workers.run_one(worker)
     }
 
     /// Runs jobs here until nothing waits any more. Only without threads.
     pub fn settle(&mut self, state: &mut State) -> Vec<UiRequest> {
         use strum::IntoEnumIterator as _;
         let mut ui = self.tick(state, Vec::new());
-        while Lane::iter().any(|lane| self.lanes.run_one(lane)) {
+        while Worker::iter().any(|worker| self.workers.run_one(worker)) {
             ui.extend(self.tick(state, Vec::new()));
         }
         ui
     }
 
-    /// Jobs that wait on a lane.
-    pub fn waiting(&self, lane: Lane) -> usize {
-        self.lanes.waiting(lane)
+    /// Jobs that wait on a worker.
+    pub fn waiting(&self, worker: Worker) -> usize {
+        self.workers.waiting(worker)
     }
 
     fn run(&mut self, state: &mut State, command: impl Into<Command>, ui: &mut Vec<UiRequest>) {
@@ -241,7 +243,7 @@ impl Drop for Runtime {
             cancel.cancel();
         }
         self.follow(None);
-        self.lanes.close();
+        self.workers.close();
     }
 }
 

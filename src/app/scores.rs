@@ -1,6 +1,6 @@
 //! [`ScoreTable`]: the scores of the pairs of a data set, as lists and pictures show them.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use strum::IntoEnumIterator as _;
@@ -26,20 +26,8 @@ pub struct SourceScores {
     pub scored: usize,
     /// By pair.
     grasps: Vec<Option<GraspScore>>,
-    /// The metrics that some pair has, each with the badness beyond which a value is among the worst tenth, and beyond
-    /// which among the next two.
-    metrics: BTreeMap<Metric, [f64; 2]>,
-}
-
-/// The standing of a value among those of all pairs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Grade {
-    /// Among the better seven tenths.
-    Fine,
-    /// Among the three worst tenths.
-    Poor,
-    /// Among the worst tenth.
-    Worst,
+    /// The metrics that some pair has.
+    metrics: BTreeSet<Metric>,
 }
 
 impl SourceScores {
@@ -50,28 +38,22 @@ impl SourceScores {
 
     /// The metrics that some pair has.
     pub fn metrics(&self) -> impl Iterator<Item = Metric> {
-        self.metrics.keys().copied()
+        self.metrics.iter().copied()
     }
 
     /// True where some pair has a metric.
     pub fn has(&self, metric: Metric) -> bool {
-        self.metrics.contains_key(&metric)
+        self.metrics.contains(&metric)
     }
 
     /// A metric of a pair; `None` where it was not scored.
     pub fn value(&self, pair: PairId, metric: Metric) -> Option<f64> {
-        self.grasps.get(pair.0 as usize)?.as_ref()?.metric(metric)
+        self.grasp(pair)?.metric(metric)
     }
 
-    /// The standing of a value of a metric among those of all pairs.
-    pub(crate) fn standing(&self, metric: Metric, value: f64) -> Grade {
-        let bad = metric.badness(value);
-        match self.metrics.get(&metric) {
-            _ if value.is_nan() => Grade::Worst,
-            Some([worst, _]) if bad > *worst => Grade::Worst,
-            Some([_, poor]) if bad > *poor => Grade::Poor,
-            _ => Grade::Fine,
-        }
+    /// The scores of a pair; `None` where it was not scored.
+    pub fn grasp(&self, pair: PairId) -> Option<&GraspScore> {
+        self.grasps.get(pair.0 as usize)?.as_ref()
     }
 }
 
@@ -86,13 +68,8 @@ impl ScoreTable {
                     grasps[*place] = Some(grasp.clone());
                 }
             }
-            let metrics = Metric::iter().filter_map(|metric| {
-                let values = grasps.iter().flatten().filter_map(|grasp| grasp.metric(metric));
-                let mut badness: Vec<f64> = values.map(|value| metric.badness(value)).collect();
-                badness.sort_by(f64::total_cmp);
-                let at = |tenths: usize| badness.get((badness.len() * tenths / 10).checked_sub(1)?).copied();
-                (!badness.is_empty()).then(|| (metric, [9, 7].map(|tenths| at(tenths).unwrap_or(f64::INFINITY))))
-            });
+            let metrics =
+                Metric::iter().filter(|metric| grasps.iter().flatten().any(|grasp| grasp.metric(*metric).is_some()));
             let (name, upper_bound, metrics) = (scores.method.as_str().into(), scores.upper_bound, metrics.collect());
             let scored = grasps.iter().flatten().count();
             SourceScores { name, upper_bound, scored, grasps, metrics }

@@ -1,144 +1,249 @@
-//! [`Services`]: files and models as the lanes use them; tests put their own behind it.
-//!
-//! The studio and the command line use [`DataSource`] and [`Services`] as [`live`] implements them over `io` and `infer`.
+//! [`Services`]: the folders of the program and its models, as jobs use them.
 
-pub mod live;
-
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
-use std::sync::{Arc, LazyLock};
+use std::path::PathBuf;
 use std::time::Duration;
 
-use super::keys::{PredictionKey, TouchKey};
-pub use super::source::{DataSource, Followed};
-use super::state::labels::Review;
-use super::state::library::Place;
-use super::state::settings::Settings;
-use touch2touch_core::contact::ContactMask;
-use touch2touch_core::diffusion::GenerateConfig;
-use touch2touch_core::grid::{DepthMap, RgbGrid};
+use serde_json::Value;
+
+use super::source::Place;
+use super::state::settings::{SETTINGS_VERSION, Settings};
 use touch2touch_pipeline::error::TaskError;
-use touch2touch_pipeline::infer::engine::EngineChoice;
+use touch2touch_pipeline::infer::store::{self, Store};
 use touch2touch_pipeline::io::statistics::ShiftStatistics;
-use touch2touch_pipeline::job::JobCx;
-use touch2touch_pipeline::labels::Recovered;
-use touch2touch_pipeline::steps::bundles::BundleInfo;
-use touch2touch_pipeline::steps::models::{GenerateInput, Models};
-use touch2touch_pipeline::steps::prediction::Prediction;
+use touch2touch_pipeline::io::{atomic, files, folders};
+use touch2touch_pipeline::learn::new_bundle::models_folder;
+use touch2touch_pipeline::learn::tuning::unfinished_folder;
+use touch2touch_pipeline::steps::models::Models;
 
-/// A data set that was opened.
-#[derive(Clone)]
-pub struct Opened {
-    /// The data.
-    pub source: Arc<dyn DataSource>,
-    /// Review states stored with it that are not "todo", by pair name.
-    pub reviews: BTreeMap<String, Review>,
-    /// Notes stored with it, by pair name.
-    pub notes: BTreeMap<String, String>,
-    /// Labels that could not be saved before, and are now.
-    pub recovered: Recovered,
-}
+/// The settings file inside the configuration folder.
+const SETTINGS_FILE: &str = "settings.json";
+/// The place to which a settings file is put that cannot be used.
+const BAD_SETTINGS_FILE: &str = "settings.bad.json";
 
-impl std::fmt::Debug for Opened {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "Opened({}, {} reviews)", self.source.title(), self.reviews.len())
-    }
-}
-
-/// Files and models, as the lanes use them.
-pub trait Services: Send + Sync {
-    /// Reads the index of a data set.
-    ///
-    /// # Errors
-    /// If nothing in it can be opened.
-    fn open(&self, place: &Place) -> Result<Opened, TaskError>;
-
-    /// The bundles that ship with the program and those in `folders`; what is wrong with those that were refused.
-    fn find_bundles(&self, folders: &[PathBuf]) -> (Vec<BundleInfo>, Vec<TaskError>);
-
-    /// Runs the generator on the pictures of its input sensor; one answer for each, in order. The model
-    /// stays loaded between calls; the runtime calls this on one lane only.
-    ///
-    /// # Errors
-    /// If the model cannot be loaded or run, or the job was told to stop.
-    fn predict(
-        &self,
-        bundle: &BundleInfo,
-        engine: EngineChoice,
-        config: &GenerateConfig,
-        wanted: &[GenerateInput<'_>],
-        cx: &JobCx,
-    ) -> Result<Vec<Prediction>, TaskError>;
-
-    /// The predictions of a touch that are kept on the disk, oldest first, with the keys that `bundles` and
-    /// `runtime` give it now. Never fails: what cannot be read is not there.
-    fn stored(
-        &self,
-        bundles: &[BundleInfo],
-        runtime: EngineChoice,
-        touch: TouchKey,
-        difference: &RgbGrid,
-    ) -> Vec<(PredictionKey, Prediction)> {
-        let _ = (bundles, runtime, touch, difference);
-        Vec::new()
-    }
-
-    /// Runs the mask model on an imprint in meters, as [`Models::mask`]; the mask says what it is made of in the end.
-    /// Called on the same lane as [`Self::predict`].
-    ///
-    /// # Errors
-    /// If the model cannot be loaded or run.
-    fn mask_by_model(
-        &self,
-        bundle: &BundleInfo,
-        runtime: EngineChoice,
-        imprint: &DepthMap,
-        probability: Option<f32>,
-    ) -> Result<ContactMask, TaskError>;
-
-    /// The models, which stay loaded between calls.
-    fn models(&self) -> &Models {
-        static MODELS: LazyLock<Models> = LazyLock::new(|| Models::new(None));
-        &MODELS
-    }
-
-    /// The folder of models that were made here.
-    fn models_folder(&self) -> Option<&Path> {
-        None
-    }
-
+/// The folders of the program, its models, which stay loaded between jobs, and how long it waits.
+#[derive(Debug)]
+pub struct Services {
+    /// The folder of settings and statistics.
+    pub config_folder: Option<PathBuf>,
+    /// The folder of fitted models.
+    pub models_folder: Option<PathBuf>,
     /// The folder of tuning that was stopped.
-    fn unfinished_folder(&self) -> Option<&Path> {
-        None
-    }
-
-    /// The time that a pair stays on screen before it is predicted without being asked for.
-    fn patience(&self) -> Duration {
-        Duration::ZERO
-    }
-
+    pub unfinished: Option<PathBuf>,
+    /// The folder of labels that could not be saved.
+    pub waiting: Option<PathBuf>,
+    /// The models.
+    pub models: Models,
+    /// The time that a pair stays on screen before it is predicted without being asked for: longer than a key that is held
+    /// down leaves it there.
+    pub patience: Duration,
     /// The time that labels that could not be written wait until they are tried again.
-    fn retry_after(&self) -> Duration {
-        Duration::from_secs(5)
+    pub retry_after: Duration,
+}
+
+impl Services {
+    /// With settings in the user's configuration folder.
+    pub fn of_user() -> Self {
+        Self {
+            config_folder: folders::config(),
+            models_folder: models_folder(),
+            unfinished: unfinished_folder(),
+            waiting: folders::data().map(|folder| folder.join("recovered")),
+            models: Models::new(store::user_folder().map(|folder| Store::new(folder, store::DEFAULT_BUDGET))),
+            ..Self::with_config_folder(None)
+        }
     }
 
-    /// The stored settings (defaults where there are none), and what was wrong if they were set aside.
-    fn load_settings(&self) -> (Settings, Option<TaskError>);
+    /// With settings, kept predictions, fitted models and labels that wait in a given folder; `None` keeps none.
+    pub fn with_config_folder(folder: Option<PathBuf>) -> Self {
+        let inside = |name: &str| folder.as_ref().map(|folder| folder.join(name));
+        Self {
+            models_folder: inside("models"),
+            unfinished: inside("unfinished"),
+            waiting: inside("recovered"),
+            models: Models::new(inside("predictions").map(|folder| Store::new(folder, store::DEFAULT_BUDGET))),
+            config_folder: folder,
+            patience: Duration::from_millis(150),
+            retry_after: Duration::from_secs(5),
+        }
+    }
 
     /// Keeps shift statistics with the program's own files; says where, or `None` where nothing is kept.
     ///
     /// # Errors
     /// If they cannot be written.
-    fn save_statistics(&self, _statistics: &ShiftStatistics) -> Result<Option<PathBuf>, TaskError> {
-        Ok(None)
+    pub(crate) fn save_statistics(&self, statistics: &ShiftStatistics) -> Result<Option<PathBuf>, TaskError> {
+        let Some(folder) = self.config_folder.as_ref().map(|folder| folder.join("statistics")) else { return Ok(None) };
+        let p = &statistics.provenance;
+        let hash = p.bundle_hash.get(..12).unwrap_or(&p.bundle_hash);
+        let dataset: String = p.dataset.chars().map(|c| if c.is_alphanumeric() { c } else { '_' }).collect();
+        let file = folder.join(format!("{hash}-{dataset}.json"));
+        std::fs::create_dir_all(&folder)
+            .map_err(|err| TaskError::new("Keep the statistics", format!("{err} ({})", folder.display())))?;
+        statistics.write(&file).map_err(|err| TaskError::from_error("Keep the statistics", &err))?;
+        Ok(Some(file))
+    }
+
+    /// The stored settings (defaults where there are none), and what was wrong if they were set aside.
+    pub fn load_settings(&self) -> (Settings, Option<TaskError>) {
+        let (settings, problem) = self.read_settings();
+        self.keep_at_most(&settings);
+        (settings, problem)
     }
 
     /// Writes the settings.
     ///
     /// # Errors
     /// If they cannot be written.
-    fn save_settings(&self, settings: &Settings) -> Result<(), TaskError>;
+    pub fn save_settings(&self, settings: &Settings) -> Result<(), TaskError> {
+        const WHAT: &str = "Save the preferences";
+        self.keep_at_most(settings);
+        let Some(folder) = &self.config_folder else { return Ok(()) };
+        let file = folder.join(SETTINGS_FILE);
+        let fail = |err: std::io::Error| TaskError::new(WHAT, format!("{err} ({})", file.display()));
+        // A path that is no text cannot be written; it must not keep everything else from being written.
+        let mut settings = settings.clone();
+        let is_text = |place: &Place| !matches!(place, Place::Path(path) if path.to_str().is_none());
+        settings.recent.retain(is_text);
+        settings.last.place = settings.last.place.filter(is_text);
+        settings.bundle_folders.retain(|folder| folder.to_str().is_some());
+        let text = serde_json::to_vec_pretty(&settings).map_err(|err| fail(err.into()))?;
+        std::fs::create_dir_all(folder).map_err(fail)?;
+        atomic::write_bytes(&file, &text).map_err(fail)
+    }
+
+    /// The budget of the kept predictions as the settings say.
+    fn keep_at_most(&self, settings: &Settings) {
+        self.models.keep_at_most(u64::from(settings.cache_mib) << 20);
+    }
+
+    fn read_settings(&self) -> (Settings, Option<TaskError>) {
+        let Some(folder) = &self.config_folder else { return (Settings::default(), None) };
+        let file = folder.join(SETTINGS_FILE);
+        let bytes = match files::read(&file, files::SMALL) {
+            Ok(bytes) => bytes,
+            Err(err) if err.kind() == std::io::ErrorKind::NotFound => return (Settings::default(), None),
+            Err(err) => {
+                let why = format!("{err} ({})", file.display());
+                return (Settings::default(), Some(TaskError::new("The preferences could not be read", why)));
+            }
+        };
+        let bad = folder.join(BAD_SETTINGS_FILE);
+        match parse_settings(&bytes) {
+            Ok((settings, refused)) => {
+                let problem = (!refused.is_empty()).then(|| {
+                    let why = format!("{} ({})", refused.join("; "), file.display());
+                    let kept = match std::fs::copy(&file, &bad) {
+                        Ok(_) => format!("Old file: {}", bad.display()),
+                        Err(err) => format!("The old file could not be kept: {err}"),
+                    };
+                    TaskError::new("Some preferences could not be read and were reset", why).with_hint(kept)
+                });
+                (settings.validated(), problem)
+            }
+            Err(why) => {
+                let kept = match std::fs::rename(&file, &bad) {
+                    Ok(()) => format!("Old file: {}", bad.display()),
+                    Err(err) => format!("The old file could not be kept: {err}."),
+                };
+                let why = format!("{why} ({})", file.display());
+                let problem = TaskError::new("Preferences could not be read and were reset", why).with_hint(kept);
+                (Settings::default(), Some(problem))
+            }
+        }
+    }
 }
 
-/// Shared services.
-pub(crate) type SharedServices = Arc<dyn Services>;
+/// The settings, and which of them could not be used.
+fn parse_settings(bytes: &[u8]) -> Result<(Settings, Vec<String>), String> {
+    let mut value: Value = serde_json::from_slice(bytes).map_err(|err| err.to_string())?;
+    let version = value.get("version").and_then(Value::as_u64);
+    if version != Some(SETTINGS_VERSION.into()) {
+        return Err(format!(
+            "they are of version {}, this program writes version {SETTINGS_VERSION}",
+            version.map_or_else(|| "unknown".into(), |v| v.to_string())
+        ));
+    }
+    let fits = |value: Value| serde_json::from_value::<Settings>(value).is_ok();
+    let refused = leave_out(&mut value, "", &fits).into_iter().map(|path| format!("{path} cannot be read")).collect();
+    Ok((serde_json::from_value(value).map_err(|err| err.to_string())?, refused))
+}
+
+/// Leaves out the parts of a value that make it unfit, each as small as can be, and returns their paths: that of the value
+/// itself where nothing else helps.
+fn leave_out(value: &mut Value, path: &str, fits: &dyn Fn(Value) -> bool) -> Vec<String> {
+    if fits(value.clone()) {
+        return Vec::new();
+    }
+    let mut out = Vec::new();
+    if let Value::Object(parts) = value {
+        let dot = if path.is_empty() { "" } else { "." };
+        parts.retain(|key, part| {
+            let alone = |part| fits(Value::Object([(key.clone(), part)].into_iter().collect()));
+            let unfit = leave_out(part, &format!("{path}{dot}{key}"), &alone);
+            out.extend(unfit);
+            alone(part.clone())
+        });
+    }
+    if let Value::Array(parts) = value {
+        let mut at = 0;
+        parts.retain_mut(|part| {
+            let alone = |part| fits(Value::Array(vec![part]));
+            out.extend(leave_out(part, &format!("{path}[{at}]"), &alone));
+            at += 1;
+            alone(part.clone())
+        });
+    }
+    if fits(value.clone()) { out } else { vec![path.to_owned()] }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::app::settings::{CompareChoice, Workspace};
+    use touch2touch_pipeline::compare::subject::Subject;
+
+    #[test]
+    fn settings_come_back_and_bad_ones_are_set_aside() {
+        let folder = tempfile::tempdir().unwrap();
+        let services = Services::with_config_folder(Some(folder.path().join("new")));
+        assert_eq!(services.load_settings(), (Settings::default(), None));
+        let mut settings = Settings::default();
+        settings.mask.radius_px = 7.5;
+        settings.recent.push(Place::Path("/data/x".into()));
+        services.save_settings(&settings).unwrap();
+        assert_eq!(services.load_settings(), (settings, None));
+        let file = folder.path().join("new").join(SETTINGS_FILE);
+        for bad in ["", "[1, 2", r#"{"version": 999}"#, r#"{"theme": "light"}"#] {
+            std::fs::write(&file, bad).unwrap();
+            let (settings, problem) = services.load_settings();
+            assert_eq!(settings, Settings::default(), "{bad}");
+            assert!(problem.unwrap().hint.unwrap().contains(BAD_SETTINGS_FILE));
+            assert!(!file.exists(), "set aside, so that the next start is quiet");
+            assert_eq!(std::fs::read_to_string(file.with_file_name(BAD_SETTINGS_FILE)).unwrap(), bad);
+        }
+        // Numbers that cannot be worked with are brought into range; unknown and missing keys are no harm.
+        std::fs::write(&file, r#"{"version": 1, "ui_zoom": 1e9, "new_key": 3}"#).unwrap();
+        assert_eq!(services.load_settings().0.ui_zoom, 4.0);
+        // Keys that cannot be used cost nothing else, and are said.
+        // A field that cannot be read falls back alone, and the file as it was is kept.
+        let one = r#"{"version": 1, "theme": "plaid", "ui_zoom": 2.0, "recent": ["demo", 7, {"path": "/data/x"}],
+            "compare": {"inspect": {"a": "measured", "b": "prediction:bundle=a, b"}, "label": {"a": "stored"}},
+            "mask": {"radius_px": "wide", "clean_mm": 2.0}, "last": {"cameras": ["one"], "pair": "data_6"}}"#;
+        std::fs::write(&file, one).unwrap();
+        let (settings, problem) = services.load_settings();
+        let problem = problem.unwrap();
+        assert!(problem.hint.unwrap().contains(BAD_SETTINGS_FILE));
+        let fields = ["compare.inspect.b", "last.cameras", "mask.radius_px", "recent[1]", "theme"];
+        let fields = fields.map(|field| format!("{field} cannot be read")).join("; ");
+        assert_eq!(problem.why, format!("{fields} ({})", file.display()));
+        assert_eq!(std::fs::read_to_string(file.with_file_name(BAD_SETTINGS_FILE)).unwrap(), one);
+        let mut want = Settings { ui_zoom: 2.0, ..Settings::default() };
+        want.recent = vec![Place::Demo, Place::Path("/data/x".into())];
+        want.mask.clean_mm = 2.0;
+        want.last.pair = "data_6".into();
+        let compared = |a| CompareChoice { a, ..CompareChoice::default() };
+        want.compare.insert(Workspace::Inspect, compared(Subject::Measured));
+        want.compare.insert(Workspace::Label, compared(Subject::Stored));
+        assert_eq!(settings, want);
+    }
+}

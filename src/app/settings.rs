@@ -1,8 +1,8 @@
 //! The room of the preferences. Each change is saved.
 
 pub use super::pane::Workspace;
-pub use super::state::settings::scene::{LayerLook, LayerSize, SceneLayer, SceneLook};
-pub use super::state::settings::versus::{Versus, VersusMode};
+pub use super::state::settings::compare::{CompareChoice, CompareMode};
+pub use super::state::settings::scene::{SceneLayer, SceneLook};
 pub(crate) use super::state::settings::{BRUSH_RADIUS_PX, CLEAN_MM, MAX_CACHE_MIB, STEPS};
 pub use super::state::settings::{
     ColorMap, ColorRange, GelView, GenerateSettings, Last, MaskChoice, MaskSettings, MaskSource, MaskTool,

@@ -73,7 +73,7 @@ pub struct State {
 impl State {
     /// The sensors of the open data set; the lab's while none is open.
     pub fn rig(&self) -> Arc<Rig> {
-        self.library.open.as_ref().map_or_else(Rig::lab, |open| open.source.rig())
+        self.library.open.as_ref().map_or_else(Rig::lab, |open| open.source.dataset.rig.clone())
     }
 
     /// The fingers on screen, the active one first.
@@ -126,6 +126,11 @@ impl State {
     /// True where a pane on screen needs something.
     pub(super) fn needs(&self, need: Demand) -> bool {
         self.selection.panes.iter().any(|pane| pane.needs().contains(&need))
+    }
+
+    /// Closes the dialogs that stand beside the work: there is one at a time.
+    pub(super) fn close_dialogs(&mut self) {
+        (self.export.asking_masks, self.export.importing, self.doctor.shown) = (false, None, false);
     }
 
     /// True where a 3D view of a side is on screen.

@@ -2,11 +2,11 @@
 
 use std::path::PathBuf;
 
-pub(crate) use super::state::tasks::Task;
+pub(crate) use super::state::tasks::RunningTask;
 pub use super::state::tasks::{Entry, Level, Log, TaskKind, Tasks, Ticket};
 
-use super::effect::{Access, Effect, Errand, Started};
-use super::jobs::Lane;
+use super::effect::{Access, Effect, Task, TaskJob};
+use super::jobs::Worker;
 use super::state::State;
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::job::{JobCx, Progress};
@@ -50,20 +50,20 @@ pub(super) fn step(state: &mut State, command: TasksCommand, effects: &mut Vec<E
     }
 }
 
-/// Starts an errand, listed under a title while it runs. `None` where one of its kind has to end first.
-pub(super) fn start<'a, E: Errand>(
+/// Starts a task, listed under a title while it runs. `None` where one of its kind has to end first.
+pub(super) fn start<'a, E: Task>(
     state: &'a mut State,
     title: impl Into<String>,
-    errand: E,
+    task: E,
     effects: &mut Vec<Effect>,
-) -> Option<&'a mut Task> {
-    if E::KIND.lane() == Lane::Batch && state.tasks.of_kind(E::KIND).is_some() {
+) -> Option<&'a mut RunningTask> {
+    if E::KIND.worker() == Worker::Batch && state.tasks.of_kind(E::KIND).is_some() {
         return None;
     }
     state.tasks.last_ticket += 1;
     let ticket = Ticket(state.tasks.last_ticket);
-    effects.push(Effect::Start(ticket, Started::new(errand)));
-    let task = Task {
+    effects.push(Effect::Start(ticket, TaskJob::new(task)));
+    let task = RunningTask {
         kind: E::KIND,
         title: title.into(),
         progress: Progress::default(),
@@ -80,25 +80,25 @@ type Writer = Box<dyn FnOnce(PathBuf, &Access, &JobCx) -> Result<(String, PathBu
 
 /// Has something written.
 pub struct Write {
-    lane: Lane,
+    worker: Worker,
     what: &'static str,
     place: PathBuf,
     writer: Writer,
 }
 
 impl Write {
-    /// On a lane, in these words, to that place.
+    /// On a worker, in these words, to that place.
     pub(super) fn new(
-        lane: Lane,
+        worker: Worker,
         what: &'static str,
         place: PathBuf,
         writer: impl FnOnce(PathBuf, &Access, &JobCx) -> Result<(String, PathBuf), TaskError> + Send + 'static,
     ) -> Self {
-        Self { lane, what, place, writer: Box::new(writer) }
+        Self { worker, what, place, writer: Box::new(writer) }
     }
 }
 
-impl Errand for Write {
+impl Task for Write {
     type End = (String, PathBuf);
     const KIND: TaskKind = TaskKind::Write;
 
@@ -106,8 +106,8 @@ impl Errand for Write {
         self.what.to_owned()
     }
 
-    fn lane(&self) -> Lane {
-        self.lane
+    fn worker(&self) -> Worker {
+        self.worker
     }
 
     fn run(self, access: &Access, cx: &JobCx) -> Result<Self::End, TaskError> {
@@ -129,7 +129,7 @@ pub(super) fn cancel_all(state: &mut State, effects: &mut Vec<Effect>) {
 }
 
 /// Ends a task; what it showed on the way is not shown any more.
-pub(super) fn forget(state: &mut State, ticket: Ticket) -> Option<Task> {
+pub(super) fn forget(state: &mut State, ticket: Ticket) -> Option<RunningTask> {
     let task = state.tasks.running.remove(&ticket)?;
     for recipe in &task.recipes {
         if state.results.previews.get(&recipe.touch).is_some_and(|preview| preview.recipe == *recipe) {

@@ -1,8 +1,6 @@
-//! The room of the workbench: layers, poses by hand, measuring.
+//! The room of the workbench: layers, poses by hand, points read.
 
 pub use super::state::workbench::{Layer, ManualTry, Picked, SceneTool, Workbench};
-
-use glam::DVec3;
 
 use super::effect::Effect;
 use super::inspect::InspectCommand;
@@ -42,10 +40,6 @@ pub enum WorkbenchCommand {
     RevertHand,
     /// Reads a point, or no longer.
     Pick(Option<Picked>),
-    /// Adds a point to the measurement; after the last one it begins anew.
-    Mark(ImprintSource, DVec3),
-    /// Forgets the measurement.
-    ClearMarks,
 }
 
 pub(super) fn step(state: &mut State, command: WorkbenchCommand, effects: &mut Vec<Effect>) {
@@ -62,7 +56,6 @@ pub(super) fn step(state: &mut State, command: WorkbenchCommand, effects: &mut V
             }
             let bench = &mut state.workbench;
             bench.tool = tool;
-            bench.marks.clear();
             if tool != SceneTool::Pose {
                 bench.hand = None;
             }
@@ -82,18 +75,6 @@ pub(super) fn step(state: &mut State, command: WorkbenchCommand, effects: &mut V
         WorkbenchCommand::AcceptHand => accept(state, effects),
         WorkbenchCommand::RevertHand => bench.hand = None,
         WorkbenchCommand::Pick(picked) => bench.picked = picked,
-        WorkbenchCommand::Mark(side, point) => {
-            let needed = bench.tool.marks();
-            if needed == 0 || !point.is_finite() {
-                return;
-            }
-            // A measurement is of one view; a complete one makes room for the next.
-            if bench.marks.len() >= needed || bench.marks.first().is_some_and(|(of, _)| *of != side) {
-                bench.marks.clear();
-            }
-            bench.marks.push((side, point));
-        }
-        WorkbenchCommand::ClearMarks => bench.marks.clear(),
     }
 }
 
@@ -163,7 +144,7 @@ fn start_icp(state: &mut State, effects: &mut Vec<Effect>) {
     if state.results.runs.contains(&key) {
         run_arrived(state, &key);
     }
-    // The time machine shows the same run, at its end: there the tool in hand goes.
+    // The pane of the steps shows the same run, at its end: there the tool in hand goes.
     inspect::step(state, InspectCommand::Source(source), effects);
     inspect::step(state, InspectCommand::Start(Some(start)), effects);
     inspect::step(state, InspectCommand::End, effects);
@@ -173,7 +154,7 @@ fn start_icp(state: &mut State, effects: &mut Vec<Effect>) {
 pub(super) fn run_arrived(state: &mut State, key: &RunKey) {
     let Some(hand) = state.workbench.hand.as_ref().filter(|hand| hand.icp.as_ref() == Some(key)) else { return };
     let source = hand.source;
-    let Some(pose) = state.results.runs.get(key).map(|run| run.grasp_from_object) else { return };
+    let Some(pose) = state.results.runs.get(key).map(|run| run.result.grasp_from_object) else { return };
     let cost = cost_of(state, source, pose);
     if let Some(hand) = &mut state.workbench.hand {
         hand.pose = pose;

@@ -21,7 +21,7 @@ pub(crate) const SHADERS: &[(&str, &str)] = &[
     ("mesh.wgsl", include_str!("../../shaders/mesh.wgsl")),
     ("points.wgsl", include_str!("../../shaders/points.wgsl")),
     ("shadow.wgsl", include_str!("../../shaders/shadow.wgsl")),
-    ("sheet.wgsl", include_str!("../../shaders/sheet.wgsl")),
+    ("raster.wgsl", include_str!("../../shaders/raster.wgsl")),
 ];
 
 /// A shader text that cannot be used.

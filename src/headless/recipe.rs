@@ -5,8 +5,7 @@ mod args;
 use std::path::{Path, PathBuf};
 
 use super::contact_mask::MaskArgs;
-use crate::app::services::Services as _;
-use crate::app::services::live::LiveServices;
+use crate::app::services::Services;
 use touch2touch_core::dataset::Problem;
 use touch2touch_core::pose::Registration;
 use touch2touch_core::postprocess::ShiftMode;
@@ -100,7 +99,7 @@ impl ModelArgs {
 
 /// The user's kept predictions with the budget of the studio's preferences; `None` without a folder for them.
 pub(super) fn kept() -> Option<Store> {
-    let (settings, _) = LiveServices::new().load_settings();
+    let (settings, _) = Services::of_user().load_settings();
     Some(Store::new(user_folder()?, u64::from(settings.cache_mib) << 20))
 }
 

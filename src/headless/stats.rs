@@ -14,13 +14,10 @@ use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_core::units::{fixed, mm};
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::io::statistics::ShiftStatistics;
-use touch2touch_pipeline::job::JobCx;
 use touch2touch_pipeline::labels::ImprintSource;
 use touch2touch_pipeline::pairs;
 use touch2touch_pipeline::scores::statistics::{PAIRS, StatisticsSetup, statistics};
 use touch2touch_pipeline::steps::imprint::chain_of;
-use touch2touch_pipeline::steps::models::GenerateInput;
-use touch2touch_pipeline::steps::predict::Generating;
 
 /// Arguments of `stats`.
 #[derive(Debug, Args)]
@@ -63,12 +60,9 @@ pub(super) fn run(args: &StatsArgs) -> VerbResult {
     let generating = recipe.generating()?;
     let chain = chain_of(&models.chains(generating.bundle)?, &generating.bundle.id, ShiftMode::Raw)?;
     let load = |id| dataset.load(id).map(Arc::new).map_err(|err| TaskError::from_error("Load", &err));
-    let predict = |by: Generating<'_>, inputs: &[GenerateInput<'_>], cx: &JobCx| {
-        models.predict(by.bundle, by.engine, by.config, inputs, cx)
-    };
     let fingers = args.finger.fingers(&dataset.rig)?;
     let setup = StatisticsSetup { pairs: ids, fingers, recipe: recipe.clone(), dataset: dataset.title.clone() };
-    let (statistics, failed) = statistics(&setup, load, predict, &output.job())?;
+    let (statistics, failed) = statistics(&setup, load, &models, &output.job())?;
     for failure in &failed {
         output.note(&failure.to_string());
     }

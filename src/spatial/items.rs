@@ -132,5 +132,5 @@ pub fn guides(ground: [f32; 3], ink: [f32; 3], revision: u64) -> [LinesItem; 2] 
 
 /// The place of the axes: on the floor beside the tool, where they hide nothing.
 pub fn axes_origin() -> DVec3 {
-    DVec3::new(0.03, -0.03, FLOOR_M)
+    DVec3::new(0.022, -0.022, FLOOR_M)
 }

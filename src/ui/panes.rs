@@ -2,6 +2,7 @@
 
 pub(crate) mod adapt;
 pub(crate) mod browser;
+pub(crate) mod compare;
 pub(crate) mod generate;
 pub(crate) mod images;
 pub(crate) mod log;
@@ -10,6 +11,4 @@ pub(crate) mod metrics;
 pub(crate) mod results;
 pub(crate) mod scene;
 pub(crate) mod settings_pane;
-pub(crate) mod table;
-pub(crate) mod timemachine;
-pub(crate) mod versus;
+pub(crate) mod steps;

@@ -2,7 +2,7 @@
 
 pub(crate) mod cx;
 pub(crate) mod dialogs;
-pub(crate) mod kept;
+pub(crate) mod frame_cache;
 pub(crate) mod letters;
 pub(crate) mod made_with;
 pub(crate) mod pen;

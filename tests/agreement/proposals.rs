@@ -63,7 +63,8 @@ fn what_is_proposed_is_the_same_on_the_screen_and_by_verb() {
         [ProposalSource::Automatic, ProposalSource::CadTruth, ProposalSource::CadRegistered, ProposalSource::Grow]
     {
         let mut studio = open(&folder, home.path());
-        let at = studio.state.library.open.as_ref().unwrap().source.index().pairs.iter().position(|p| p.name == name);
+        let at =
+            studio.state.library.open.as_ref().unwrap().source.dataset.index.pairs.iter().position(|p| p.name == name);
         studio.send(LibraryCommand::Select(PairId(at.unwrap() as u32)).into());
         let mask = MaskSettings { proposal: source, choice, radius_px: 3.0, ..MaskSettings::default() };
         studio.send(prefer(move |s| s.mask = mask.clone()).into());

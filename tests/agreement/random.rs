@@ -4,7 +4,6 @@
 pub(super) mod compared;
 pub(super) mod files;
 pub(super) mod labels;
-#[cfg(feature = "tune")]
 pub(super) mod learned;
 pub(super) mod posed;
 pub(super) mod tables;
@@ -108,7 +107,7 @@ impl Both {
     }
 
     fn pairs(&self) -> u32 {
-        self.studio.state.library.open.as_ref().unwrap().source.index().pairs.len() as u32
+        self.studio.state.library.open.as_ref().unwrap().source.dataset.index.pairs.len() as u32
     }
 
     /// Puts a recipe in force and has a pair predicted with it.

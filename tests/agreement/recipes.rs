@@ -210,7 +210,6 @@ pub(super) fn a_random_recipe_gives_the_same_results_table_in_the_studio_and_by_
     let lab = lab_folder(home.path());
     let mut rows = 0;
     let mut studio = Studio::open(Place::Path(lab), home.path());
-    studio.send(EvaluateCommand::Grasps(Some(2)).into());
     studio.send(EvaluateCommand::Published(false).into());
     for _ in 0..3 {
         let mut recipe = recipe().new_tree(&mut runner).unwrap().current().of(ImprintSource::Predicted);

@@ -6,13 +6,10 @@ use touch2touch::app::workbench::Layer;
 use touch2touch_pipeline::still::space::{Ground, SpacePane, ViewAngles};
 
 use super::*;
-#[cfg(feature = "gui")]
 use crate::support;
 
 #[test]
-#[cfg_attr(not(feature = "gui"), ignore = "without the renderer there is no still")]
 pub(super) fn pictures_in_3d_are_the_same_files_in_both() {
-    #[cfg(feature = "gui")]
     let Some(_device) = support::gpu() else { return };
     let home = tempfile::tempdir().unwrap();
     let at = |name: &str| home.path().join(name);

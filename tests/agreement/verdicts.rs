@@ -23,7 +23,7 @@ pub(super) fn verdict_and_likeliest_tool_are_the_same_on_the_screen_and_by_verb(
     let case = |report: &serde_json::Value, name: &str| {
         report["cases"].as_array().unwrap().iter().find(|case| case["name"] == name).unwrap().clone()
     };
-    let pairs = studio.state.library.open.as_ref().unwrap().source.index().pairs.len();
+    let pairs = studio.state.library.open.as_ref().unwrap().source.dataset.index.pairs.len();
     let mut ranked = 0;
     for pair in 0..pairs {
         studio.send(LibraryCommand::Select(PairId(pair as u32)).into());

@@ -1,11 +1,10 @@
 //! Which predictions are made, what is shown on the way, and what is found again.
 
-use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 
 use touch2touch::app::command::{Answer, LibraryCommand, Pane, PredictCommand, ViewCommand};
-use touch2touch::app::effect::Ended;
-use touch2touch::app::jobs::Lane;
+use touch2touch::app::effect::TaskResult;
+use touch2touch::app::jobs::Worker;
 use touch2touch::app::keys::Preview;
 use touch2touch::app::keys::{ImprintSource, PredictionKey, Preset, Sampler, Spacing};
 use touch2touch::app::predict::Generate;
@@ -20,7 +19,7 @@ use touch2touch_core::grid::DepthMap;
 use touch2touch_core::rig::{PadId, lab};
 use touch2touch_pipeline::infer::bundle::{Origin, SensorPair};
 
-use super::double::{Bench, SIMULATED};
+use super::bench::{Bench, Folders, SIMULATED, models};
 use super::panes;
 use touch2touch::app::results::Onlooker;
 use touch2touch_pipeline::job::{JobCx, PreviewPicture};
@@ -37,7 +36,7 @@ fn preview(recipe: &PredictionKey, step: u32) -> Arc<Preview> {
 
 #[test]
 fn a_proposal_at_the_registered_pose_of_a_prediction_that_nobody_made_ends() {
-    let mut bench = Bench::open_simulated();
+    let mut bench = Bench::open();
     bench.send(panes(&[Pane::Masks, Pane::Predicted]));
     bench.send(prefer(|s| s.mask.proposal = ProposalSource::CadRegistered));
     bench.send(ViewCommand::SelectImprint(ImprintSource::Predicted));
@@ -55,11 +54,11 @@ fn the_pair_that_stays_on_screen_is_predicted_by_itself_where_that_costs_little(
     bench.send(panes(&[Pane::Predicted]));
     bench.send(LibraryCommand::Select(PairId(1)));
     bench.settle();
-    assert_eq!(bench.services.generated(), 0, "switched off");
+    assert_eq!(bench.generated(), 0, "switched off");
     let by_itself = |on: bool| prefer(move |s| s.generate.by_itself = on);
     bench.send(by_itself(true));
     bench.settle();
-    assert_eq!(bench.services.generated(), 1);
+    assert_eq!(bench.generated(), 1);
     let key = results::chosen(&bench.state, RIGHT).expect("it is shown").clone();
     assert_eq!(bench.state.results.cost_of(&key), bench.state.results.predictions.get(&key).map(|made| made.seconds));
     // Of pairs that were left before their turn none is made.
@@ -67,21 +66,21 @@ fn the_pair_that_stays_on_screen_is_predicted_by_itself_where_that_costs_little(
         bench.send(LibraryCommand::Select(PairId(pair)));
     }
     bench.settle();
-    assert_eq!(bench.services.generated(), 2);
+    assert_eq!(bench.generated(), 2);
     assert!(results::chosen(&bench.state, RIGHT).is_some());
     // A pane that shows no prediction asks for none.
     bench.send(panes(&[Pane::Measured]));
     bench.send(LibraryCommand::Select(PairId(6)));
     bench.settle();
-    assert_eq!(bench.services.generated(), 2);
+    assert_eq!(bench.generated(), 2);
     // On a machine that takes long for it nobody waits for what was not asked for.
     let slow = Prediction { seconds: 5.0, ..(**bench.state.results.predictions.get(&key).unwrap()).clone() };
     let keys: Vec<_> = bench.state.results.predictions.iter().map(|(key, _)| key.clone()).collect();
     let slow = keys.into_iter().map(|key| (key, Arc::new(slow.clone()))).collect();
-    bench.send(Answer::Ended(Ticket(u64::MAX), Ended::of::<Generate>(slow)));
+    bench.send(Answer::TaskResult(Ticket(u64::MAX), TaskResult::of::<Generate>(slow)));
     bench.send(panes(&[Pane::Predicted]));
     bench.settle();
-    assert_eq!(bench.services.generated(), 2);
+    assert_eq!(bench.generated(), 2);
     assert!(matches!(
         results::imprint(&bench.state, ImprintSource::Predicted, RIGHT),
         Lookup::Absent(Absent::NoPrediction)
@@ -90,14 +89,14 @@ fn the_pair_that_stays_on_screen_is_predicted_by_itself_where_that_costs_little(
 
 #[test]
 fn a_finger_that_nobody_looks_at_is_not_generated() {
-    let mut bench = Bench::open_simulated();
+    let mut bench = Bench::open();
     bench.send(LibraryCommand::Select(SIMULATED));
     bench.send(panes(&[Pane::Predicted, Pane::Generate]));
     bench.settle();
     bench.send(PredictCommand::Generate);
     bench.settle();
     assert!(results::chosen(&bench.state, RIGHT).is_some() && results::chosen(&bench.state, LEFT).is_none());
-    assert_eq!(bench.services.generated(), 1);
+    assert_eq!(bench.generated(), 1);
     // A pane that makes a pose of both wants the other one too, made like the first.
     bench.send(prefer(move |s| s.generate.seed = 5));
     bench.send(panes(&[Pane::Predicted, Pane::Scene]));
@@ -105,21 +104,20 @@ fn a_finger_that_nobody_looks_at_is_not_generated() {
     let (right, left) =
         (results::chosen(&bench.state, RIGHT).unwrap().clone(), results::chosen(&bench.state, LEFT).unwrap().clone());
     assert_eq!(PredictionKey { touch: left.touch, ..right }, left);
-    assert_eq!(bench.services.generated(), 2);
+    assert_eq!(bench.generated(), 2);
     assert!(results::cloud(&bench.state, ImprintSource::Predicted).ready().unwrap().finger(LEFT).is_some());
     // Both on screen are made together, in one call.
     bench.send(panes(&[Pane::Predicted]));
     bench.send(ViewCommand::ShowBothFingers(true));
-    let batches = bench.services.batches.load(Ordering::Relaxed);
     bench.send(PredictCommand::GenerateNewSeed);
     bench.settle();
-    assert_eq!((bench.services.generated(), bench.services.batches.load(Ordering::Relaxed)), (4, batches + 1));
+    assert_eq!(bench.generated(), 4);
     // Switched off, only the active one is made.
     let one = GenerateSettings { both_fingers: false, ..bench.state.settings.generate.clone() };
     bench.send(prefer(move |s| s.generate = one.clone()));
     bench.send(PredictCommand::GenerateNewSeed);
     bench.settle();
-    assert_eq!(bench.services.generated(), 5);
+    assert_eq!(bench.generated(), 5);
 }
 
 #[test]
@@ -149,7 +147,8 @@ fn previews_are_wanted_where_somebody_looks_and_end_with_the_result() {
 
 #[test]
 fn what_was_made_before_the_start_is_found_when_its_pair_is_looked_at() {
-    let mut bench = Bench::open();
+    let folders = Folders::new();
+    let mut bench = Bench::keeping(folders.clone(), models());
     bench.send(panes(&[Pane::Predicted]));
     bench.settle();
     bench.send(PredictCommand::Generate);
@@ -157,15 +156,10 @@ fn what_was_made_before_the_start_is_found_when_its_pair_is_looked_at() {
     let first = results::chosen(&bench.state, RIGHT).unwrap().clone();
     bench.send(PredictCommand::GenerateNewSeed);
     bench.settle();
-    let made: Vec<(PredictionKey, Prediction)> = bench.state.results.made[&first.touch]
-        .iter()
-        .map(|r| (r.clone(), (**bench.state.results.predictions.get(r).unwrap()).clone()))
-        .collect();
-    assert_eq!(made.len(), 2);
+    assert_eq!(bench.state.results.made[&first.touch].len(), 2);
 
-    let mut again = Bench::open();
-    *again.services.kept.lock().unwrap() = made;
-    assert_eq!(again.services.looked_up.load(Ordering::Relaxed), 0, "no pane shows a prediction");
+    let mut again = Bench::keeping(folders, models());
+    assert!(again.state.results.looked_up.is_empty(), "no pane shows a prediction");
     again.send(panes(&[Pane::Predicted]));
     again.settle();
     let touch = again.state.touch_key(RIGHT).unwrap();
@@ -173,14 +167,14 @@ fn what_was_made_before_the_start_is_found_when_its_pair_is_looked_at() {
     // Shown is the one that the settings would make (seed 42), not simply the last.
     assert_eq!(results::chosen(&again.state, RIGHT).unwrap().config.seed, 42);
     assert!(results::imprint(&again.state, ImprintSource::Predicted, RIGHT).ready().is_some());
-    assert_eq!(again.services.generated(), 0);
-    let looked = again.services.looked_up.load(Ordering::Relaxed);
+    assert!(again.state.results.predictions.iter().all(|(_, made)| made.kept));
+    let looked = again.state.results.looked_up.len();
     again.send(LibraryCommand::Step(1));
     again.settle();
     again.send(LibraryCommand::Step(-1));
     again.settle();
-    assert_eq!(again.services.looked_up.load(Ordering::Relaxed), looked + 1, "each touch is looked up once");
-    assert!(again.runtime.waiting(Lane::Files) == 0);
+    assert_eq!(again.state.results.looked_up.len(), looked + 1, "each touch is looked up once");
+    assert!(again.runtime.waiting(Worker::Files) == 0);
 }
 
 #[test]
@@ -190,7 +184,7 @@ fn presets_follow_the_bundle_and_own_numbers_leave_them() {
     bench.settle();
     let touch = bench.state.touch_key(RIGHT).unwrap();
     assert_eq!(bench.state.settings.generate.preset, Some(Preset::Default));
-    assert_eq!(recipe::prediction(&bench.state, touch).unwrap().config.steps, 20, "what the bundle recommends");
+    assert_eq!(recipe::prediction(&bench.state, touch).unwrap().config.steps, 6, "what the bundle recommends");
     let fast = GenerateSettings { preset: Some(Preset::Fast), ..bench.state.settings.generate.clone() };
     bench.send(prefer(move |s| s.generate = fast.clone()));
     assert!(recipe::prediction(&bench.state, touch).unwrap().config.steps <= 4);

@@ -1,4 +1,4 @@
-//! The time machine: computed only while looked at, found again under their recipe.
+//! The steps of a registration: computed only while looked at, found again under their recipe.
 
 use touch2touch::app::action::Action;
 use touch2touch::app::command::{Command, LibraryCommand, Pane};
@@ -11,14 +11,14 @@ use touch2touch::app::{demand, results};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::frames::PlanarPose;
 
-use super::double::{Bench, SIMULATED};
+use super::bench::{Bench, SIMULATED};
 use super::panes;
 
 const MEASURED: ImprintSource = ImprintSource::Measured;
 
 /// The simulated grasp with the true contact as its mask.
 fn bench(list: &[Pane]) -> Bench {
-    let mut bench = Bench::open_simulated();
+    let mut bench = Bench::open();
     bench.send(prefer(|s| s.mask.choice.source = MaskSource::Truth));
     bench.send(LibraryCommand::Select(SIMULATED));
     bench.send(panes(list));
@@ -35,14 +35,14 @@ fn nothing_is_recorded_unless_it_is_looked_at() {
     let mut bench = bench(&[Pane::Scene, Pane::Metrics]);
     let pose = results::pose(&bench.state, MEASURED).ready().unwrap().clone();
     assert!(pose.report.trace.is_empty() && pose.report.fits.is_empty());
-    assert!(bench.state.results.inspections.is_empty());
+    assert!(bench.state.results.runs.is_empty());
     assert!(Action::StepBack.command(&bench.state).is_none(), "there is nothing to step through");
-    // The time machine alone records; it needs no pose beside.
-    bench.state.results.poses.clear();
-    bench.send(panes(&[Pane::TimeMachine]));
+    // The pane of the steps alone records; it needs no pose beside.
+    bench.state.results.estimates.clear();
+    bench.send(panes(&[Pane::Steps]));
     bench.settle();
-    assert_eq!(bench.state.results.inspections.len(), 1);
-    assert!(bench.state.results.poses.is_empty());
+    assert_eq!(bench.state.results.runs.len(), 1);
+    assert!(results::pose(&bench.state, MEASURED).ready().is_none());
     let inspection = results::inspection(&bench.state).ready().unwrap().clone();
     assert_eq!(inspection.report().grasp_from_object, pose.grasp_from_object, "looking changes nothing");
     // A closed pane asks for nothing.
@@ -52,7 +52,7 @@ fn nothing_is_recorded_unless_it_is_looked_at() {
 
 #[test]
 fn stepping_goes_both_ways_and_stops_at_the_ends() {
-    let mut bench = bench(&[Pane::TimeMachine]);
+    let mut bench = bench(&[Pane::Steps]);
     let (run, last) = {
         let shown = results::inspected(&bench.state).unwrap();
         assert!(shown.is_last() && shown.run == shown.inspection.report().winner);
@@ -73,7 +73,7 @@ fn stepping_goes_both_ways_and_stops_at_the_ends() {
     assert_eq!(at(&bench), 0);
     {
         let shown = results::inspected(&bench.state).unwrap();
-        let first = shown.inspection.applied(run).unwrap();
+        let first = shown.inspection.step(run, 0).unwrap().grasp_from_object;
         assert_eq!(shown.step.grasp_from_object, first, "step 0 is the applied start");
         assert_eq!(shown.step.iteration, 0);
         assert!(shown.inspection.what_next(run, 0).contains("moving"));
@@ -94,7 +94,7 @@ fn stepping_goes_both_ways_and_stops_at_the_ends() {
     }
     assert!(!bench.state.inspect.playing && results::inspected(&bench.state).unwrap().is_last());
     // Scrubbing computed nothing.
-    assert_eq!(bench.state.results.inspections.len(), 1);
+    assert_eq!(bench.state.results.runs.len(), 1);
     // Another start; one that does not exist shows the last.
     send(&mut bench, InspectCommand::Run(usize::MAX));
     let shown = results::inspected(&bench.state).unwrap();
@@ -105,7 +105,7 @@ fn stepping_goes_both_ways_and_stops_at_the_ends() {
 
 #[test]
 fn a_start_is_a_run_of_its_own_and_the_pair_resets_it() {
-    let mut bench = bench(&[Pane::TimeMachine]);
+    let mut bench = bench(&[Pane::Steps]);
     let start = PlanarPose { theta_rad: 0.3, y_m: 0.004, z_m: 0.0 };
     send(&mut bench, InspectCommand::Start(Some(PlanarPose { y_m: f64::NAN, ..start })));
     assert_eq!(bench.state.inspect.start, None);
@@ -117,7 +117,7 @@ fn a_start_is_a_run_of_its_own_and_the_pair_resets_it() {
     bench.settle();
     let inspection = results::inspection(&bench.state).ready().unwrap().clone();
     assert_eq!((inspection.num_runs(), inspection.requested(0)), (1, Some(start)));
-    let applied = inspection.applied(0).unwrap();
+    let applied = inspection.step(0, 0).unwrap().grasp_from_object;
     assert!((applied.theta_rad - start.theta_rad).abs() < 1e-9 && (applied.y_m - start.y_m).abs() < 1e-9);
     assert_eq!(results::inspected(&bench.state).unwrap().at, 0, "it is watched from where it began");
     // A start far from everything is a failure of this run alone.
@@ -132,5 +132,5 @@ fn a_start_is_a_run_of_its_own_and_the_pair_resets_it() {
     bench.send(LibraryCommand::Select(PairId(0)));
     bench.settle();
     assert_eq!(bench.state.inspect.start, None);
-    assert!(results::inspected(&bench.state).is_none(), "this pair has no camera");
+    assert!(results::inspected(&bench.state).is_none(), "the true contact of this pair is not known");
 }

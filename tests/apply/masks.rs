@@ -1,9 +1,8 @@
 //! Correcting masks: strokes, clean-ups, undo, saving.
 
-use std::sync::atomic::Ordering;
-
 use touch2touch::app::action::Action;
 use touch2touch::app::command::{Answer, Command, LabelsCommand, LibraryCommand, Pane, PredictCommand, ViewCommand};
+use touch2touch::app::jobs::Worker;
 use touch2touch::app::keys::{ImprintSource, MaskVersion, Revision};
 use touch2touch::app::labels::{MaskPlace, Review};
 use touch2touch::app::results;
@@ -13,8 +12,11 @@ use touch2touch_core::dataset::PairId;
 use touch2touch_core::grid::Mask;
 use touch2touch_core::label::CleanKind;
 use touch2touch_core::rig::{PadId, lab};
+use touch2touch_pipeline::io::dataset::Dataset;
+use touch2touch_pipeline::io::masks::{FOLDER, MaskStore};
+use touch2touch_pipeline::labels::Labels;
 
-use super::double::Bench;
+use super::bench::{Bench, PAIR};
 use super::panes;
 
 const MEASURED: ImprintSource = ImprintSource::Measured;
@@ -53,7 +55,7 @@ fn a_stroke_starts_from_the_mask_shown_and_is_saved_when_it_ends() {
     assert_eq!(count(&automatic), 35 + 4, "the ring and the spot");
     begin(&mut bench, lab::RIGHT, [12.0, 2.0]);
     bench.settle();
-    assert_eq!(bench.services.source.saves.load(Ordering::Relaxed), 0, "nothing is saved while the pen is down");
+    assert!(bench.stored(PAIR).is_empty(), "nothing is saved while the pen is down");
     bench.send(LabelsCommand::StrokeTo([14.0, 2.0]));
     bench.send(LabelsCommand::EndStroke);
     let drawn = mask(&bench, lab::RIGHT);
@@ -61,7 +63,7 @@ fn a_stroke_starts_from_the_mask_shown_and_is_saved_when_it_ends() {
     let in_force = results::mask_in_force(&bench.state, MEASURED, lab::RIGHT).unwrap();
     assert_eq!(in_force.label, "edited by you, from Threshold 5.00 mm");
     bench.settle();
-    let saved = bench.services.source.labels.lock().unwrap()["tool_a/data_0"].clone();
+    let saved = bench.stored(PAIR);
     assert_eq!(*saved.measured(lab::RIGHT).unwrap().mask, drawn);
     assert_eq!(saved.measured(lab::LEFT), None);
     assert_eq!(saved.review, Review::InProgress);
@@ -79,7 +81,7 @@ fn a_stroke_starts_from_the_mask_shown_and_is_saved_when_it_ends() {
     // Undo changes the file too.
     bench.send(LabelsCommand::Undo);
     bench.settle();
-    let saved = bench.services.source.labels.lock().unwrap()["tool_a/data_0"].clone();
+    let saved = bench.stored(PAIR);
     assert_eq!(*saved.measured(lab::RIGHT).unwrap().mask, drawn);
 }
 
@@ -91,16 +93,16 @@ fn a_stroke_that_touches_nothing_leaves_nothing() {
     bench.send(prefer(|s| s.mask.tool = MaskTool::Brush));
     stroke(&mut bench, lab::RIGHT, [900.0, -900.0], [f32::NAN, 1.0]);
     bench.settle();
-    assert!(bench.state.document.drawn_mask("tool_a/data_0", &MaskPlace::measured(lab::RIGHT)).is_none());
+    assert!(bench.state.document.drawn_mask(PAIR, &MaskPlace::measured(lab::RIGHT)).is_none());
     assert!(Action::Undo.command(&bench.state).is_none());
-    assert_eq!(bench.services.source.saves.load(Ordering::Relaxed), 0);
-    assert_eq!(bench.state.document.review("tool_a/data_0"), Review::Todo);
+    assert!(bench.stored(PAIR).is_empty());
+    assert_eq!(bench.state.document.review(PAIR), Review::Todo);
     // Over what is right already it says that somebody looked: the pixels stay, and are theirs.
     let before = mask(&bench, lab::RIGHT);
     bench.send(prefer(|s| s.mask.tool = MaskTool::Eraser));
     stroke(&mut bench, lab::RIGHT, [21.0, 1.0], [22.0, 1.0]);
     assert_eq!(mask(&bench, lab::RIGHT), before);
-    let hand = bench.state.document.drawn_mask("tool_a/data_0", &MaskPlace::measured(lab::RIGHT)).unwrap();
+    let hand = bench.state.document.drawn_mask(PAIR, &MaskPlace::measured(lab::RIGHT)).unwrap();
     assert!(hand.marks.has_hand_work());
     assert!(Action::Undo.command(&bench.state).is_some());
 }
@@ -108,11 +110,11 @@ fn a_stroke_that_touches_nothing_leaves_nothing() {
 #[test]
 fn a_note_typed_during_a_stroke_is_written_without_the_stroke() {
     let mut bench = bench();
-    let name = "tool_a/data_0".to_owned();
+    let name = PAIR.to_owned();
     begin(&mut bench, lab::RIGHT, [12.0, 2.0]);
     bench.send(LabelsCommand::SetNote(name.clone(), "odd edge".into()));
     bench.settle();
-    let stored = |bench: &Bench| bench.services.source.labels.lock().unwrap()["tool_a/data_0"].clone();
+    let stored = |bench: &Bench| bench.stored(PAIR);
     assert_eq!(stored(&bench).note, "odd edge");
     assert!(stored(&bench).masks.is_empty(), "it may still be given up");
     assert!(bench.state.document.finished_labels()[&name].masks.is_empty());
@@ -152,7 +154,7 @@ fn undo_and_redo_follow_what_is_on_screen() {
     assert_eq!(mask(&bench, lab::RIGHT), first);
     bench.send(LabelsCommand::Undo);
     assert_eq!(mask(&bench, lab::RIGHT), automatic[0]);
-    assert_eq!(bench.state.document.review("tool_a/data_0"), Review::Todo, "untouched again");
+    assert_eq!(bench.state.document.review(PAIR), Review::Todo, "untouched again");
     bench.send(LabelsCommand::Redo);
     bench.send(LabelsCommand::Redo);
     assert_eq!(mask(&bench, lab::RIGHT), second);
@@ -173,17 +175,19 @@ fn clean_ups_work_on_the_mask_in_force() {
         bench.send(LabelsCommand::Undo);
         assert_eq!(count(&mask(&bench, lab::RIGHT)), expected);
     }
-    assert!(bench.state.document.drawn_mask("tool_a/data_0", &MaskPlace::measured(lab::RIGHT)).is_none());
+    assert!(bench.state.document.drawn_mask(PAIR, &MaskPlace::measured(lab::RIGHT)).is_none());
 }
 
 #[test]
 fn labels_that_cannot_be_read_are_never_written() {
     let mut bench = Bench::open();
-    bench.services.source.damaged.lock().unwrap().insert("tool_a/data_0".into());
+    let file = MaskStore::in_folder(bench.folders.data.join(FOLDER)).mask_file(PAIR, lab::RIGHT);
+    std::fs::create_dir_all(file.parent().unwrap()).unwrap();
+    std::fs::write(&file, "{ half a fi").unwrap();
     bench.send(panes(&[Pane::Measured]));
     bench.settle();
     assert_eq!(bench.errors(), 1);
-    assert!(bench.state.document.blocked("tool_a/data_0").is_some());
+    assert!(bench.state.document.blocked(PAIR).is_some());
     let automatic = mask(&bench, lab::RIGHT);
     stroke(&mut bench, lab::RIGHT, [20.0, 1.0], [21.0, 1.0]);
     for command in [
@@ -196,7 +200,7 @@ fn labels_that_cannot_be_read_are_never_written() {
     }
     bench.settle();
     assert_eq!(mask(&bench, lab::RIGHT), automatic, "the automatic mask is shown, and stays");
-    assert_eq!(bench.services.source.saves.load(Ordering::Relaxed), 0);
+    assert_eq!(std::fs::read_to_string(&file).unwrap(), "{ half a fi");
     assert!(Action::FillHoles.command(&bench.state).is_none());
 }
 
@@ -212,30 +216,29 @@ fn nothing_is_drawn_before_the_stored_labels_are_read() {
 #[test]
 fn a_full_disk_is_said_and_what_was_drawn_is_kept_and_saved_later() {
     let mut bench = bench();
-    bench.services.source.full_disk.store(true, Ordering::Relaxed);
+    bench.fill(true);
     stroke(&mut bench, lab::RIGHT, [20.0, 1.0], [21.0, 1.0]);
     bench.settle();
     assert_eq!(bench.errors(), 1);
-    assert!(bench.state.document.unsaved.contains("tool_a/data_0"));
-    bench.services.source.full_disk.store(false, Ordering::Relaxed);
+    assert!(bench.state.document.unsaved.contains(PAIR));
+    bench.fill(false);
     bench.send(LabelsCommand::Save);
     bench.settle();
     assert!(bench.state.document.unsaved.is_empty());
-    assert!(bench.services.source.labels.lock().unwrap().contains_key("tool_a/data_0"));
+    assert!(bench.stored(PAIR).measured(lab::RIGHT).is_some());
 }
 
 /// The studio says "saved" from `unsaved`: not while a newer stroke waits for the disk.
 #[test]
 fn an_answer_to_an_earlier_saving_confirms_nothing_newer() {
     let mut bench = bench();
-    let unsaved = |bench: &Bench| bench.state.document.unsaved.contains("tool_a/data_0");
+    let unsaved = |bench: &Bench| bench.state.document.unsaved.contains(PAIR);
     stroke(&mut bench, lab::RIGHT, [20.0, 1.0], [21.0, 1.0]);
     // What an earlier request, which was being carried out when this one came, is answered with.
-    bench.send(Answer::LabelsSaved("tool_a/data_0".into(), Revision(0), None));
+    bench.send(Answer::LabelsSaved(PAIR.into(), Revision(0), None));
     assert!(unsaved(&bench), "the stroke is not on the disk");
     bench.settle();
     assert!(!unsaved(&bench));
-    assert_eq!(bench.services.source.saves.load(Ordering::Relaxed), 1);
 }
 
 #[test]
@@ -244,7 +247,7 @@ fn moving_on_ends_the_stroke() {
     begin(&mut bench, lab::RIGHT, [12.0, 2.0]);
     bench.send(LibraryCommand::Step(1));
     bench.settle();
-    let saved = bench.services.source.labels.lock().unwrap()["tool_a/data_0"].clone();
+    let saved = bench.stored(PAIR);
     assert!(saved.measured(lab::RIGHT).unwrap().mask[(12, 2)]);
     assert!(bench.state.document.stroke.is_none());
 }
@@ -256,11 +259,12 @@ fn strokes_waiting_for_the_disk_become_one_and_survive_the_end() {
         stroke(&mut bench, lab::RIGHT, [20.0, y as f32 * 3.0], [21.0, y as f32 * 3.0]);
     }
     let drawn = mask(&bench, lab::RIGHT);
-    let source = bench.services.source.clone();
+    assert_eq!(bench.runtime.waiting(Worker::Files), 1);
+    let folders = bench.folders.clone();
     // The program ends before the disk had its turn: what waits to be written is written first.
     drop(bench);
-    assert_eq!(source.saves.load(Ordering::Relaxed), 1);
-    assert_eq!(*source.labels.lock().unwrap()["tool_a/data_0"].measured(lab::RIGHT).unwrap().mask, drawn);
+    let stored = Labels::of(&Dataset::open(&folders.data).unwrap()).load(PAIR).unwrap();
+    assert_eq!(*stored.measured(lab::RIGHT).unwrap().mask, drawn);
 }
 
 #[test]
@@ -273,7 +277,7 @@ fn done_goes_to_the_next_unfinished_and_survives_reopening() {
     bench.settle();
     bench.send(LibraryCommand::Reload);
     bench.settle();
-    assert_eq!(bench.state.document.review("tool_a/data_0"), Review::Done);
+    assert_eq!(bench.state.document.review(PAIR), Review::Done);
     assert_eq!(bench.state.document.review("tool_a/data_1"), Review::Flagged);
     bench.send(LibraryCommand::SetFilter("is:done".into()));
     assert_eq!(bench.state.library.order, [PairId(0)]);
@@ -309,7 +313,7 @@ fn a_mask_belongs_to_one_imprint() {
         bench.send(LabelsCommand::Undo);
     }
     bench.settle();
-    let saved = bench.services.source.labels.lock().unwrap()["tool_a/data_0"].clone();
+    let saved = bench.stored(PAIR);
     assert_eq!(saved.masks.len(), 1, "that of the measured imprint is undone");
     let (place, kept) = saved.masks.iter().next().unwrap();
     assert_eq!((place.of.source(), &kept.mask), (ImprintSource::Predicted, &changed));
@@ -336,10 +340,7 @@ fn every_tool_draws_and_undo_takes_it_back() {
         bench.send(LabelsCommand::Close);
         bench.send(LabelsCommand::EndStroke);
         assert_ne!(mask(&bench, lab::RIGHT), before, "{name}");
-        assert_eq!(
-            bench.state.history.next_undo("tool_a/data_0", &results::mask_places(&bench.state)).unwrap().name,
-            name
-        );
+        assert_eq!(bench.state.history.next_undo(PAIR, &results::mask_places(&bench.state)).unwrap().name, name);
         bench.send(LabelsCommand::Undo);
         assert_eq!(mask(&bench, lab::RIGHT), before, "{name}");
     }
@@ -383,14 +384,14 @@ fn a_polygon_counts_once_it_is_closed() {
     bench.send(LabelsCommand::Save);
     bench.settle();
     assert_eq!((set(&bench), bench.state.selection.pair), (Some(3), Some(PairId(0))));
-    assert_eq!(bench.state.document.review("tool_a/data_0"), Review::Todo);
+    assert_eq!(bench.state.document.review(PAIR), Review::Todo);
     assert!(bench.state.log.entries.iter().any(|e| e.text.contains("nothing was marked")));
     bench.send(LibraryCommand::Step(1));
     assert_eq!(last_said(&bench), "The open polygon was dropped");
     bench.send(LibraryCommand::Step(-1));
     bench.settle();
     assert_eq!(mask(&bench, lab::RIGHT), before);
-    assert!(bench.services.source.labels.lock().unwrap().values().all(|labels| labels.masks.is_empty()));
+    assert!(bench.stored(PAIR).masks.is_empty());
     // Closed, it is its corners.
     draw(&mut bench, 3);
     bench.send(LabelsCommand::Close);
@@ -398,6 +399,6 @@ fn a_polygon_counts_once_it_is_closed() {
     assert!(drawn.get(17, 9) == Some(&true) && drawn.get(11, 12) == before.get(11, 12), "{drawn:?}");
     bench.send(LibraryCommand::DoneAndNext);
     bench.settle();
-    let saved = bench.services.source.labels.lock().unwrap()["tool_a/data_0"].clone();
+    let saved = bench.stored(PAIR);
     assert_eq!((saved.review, saved.masks.values().any(|hand| *hand.mask == drawn)), (Review::Done, true));
 }

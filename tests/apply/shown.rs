@@ -13,8 +13,9 @@ use touch2touch::app::{recipe, results};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::{PadId, lab};
 use touch2touch_pipeline::infer::engine::EngineChoice;
+use touch2touch_pipeline::steps::bundles::{self, BundleInfo};
 
-use super::double::Bench;
+use super::bench::{Bench, Folders, GENERATOR, models};
 use super::panes;
 
 const RIGHT: PadId = lab::RIGHT;
@@ -63,7 +64,7 @@ impl Move {
             Self::Steps(n) => with(move |g| (g.preset, g.steps) = (None, n)),
             Self::Seed(n) => with(move |g| g.seed = n),
             Self::Eta(eta) => with(move |g| (g.preset, g.eta) = (None, eta)),
-            Self::Model(n) => with(move |g| g.bundle = Some(["gen", "fitted"][usize::from(n)].into())),
+            Self::Model(n) => with(move |g| g.bundle = Some([GENERATOR, "fitted"][usize::from(n)].into())),
             Self::Preset(preset) => with(move |g| g.preset = Some(preset)),
             Self::Runtime(runtime) => prefer(move |s| s.runtime = runtime).into(),
             Self::ByItself(on) => with(move |g| g.by_itself = on),
@@ -110,15 +111,33 @@ fn holds(state: &State, after: &str) {
     }
 }
 
-fn bench() -> Bench {
-    let mut bench = Bench::open();
-    // A second generator beside the first: what it predicts is another recipe.
-    let mut fitted = bench.state.library.bundles[0].clone();
-    (fitted.id, fitted.name) = ("fitted".into(), "fitted".into());
-    bench.state.library.bundles.push(fitted);
+/// A second generator beside the first: what it predicts is another recipe.
+fn second(folders: &Folders) -> BundleInfo {
+    let (from, to) = (&models()[0], folders.data.with_file_name("fitted"));
+    std::fs::create_dir_all(&to).unwrap();
+    for entry in std::fs::read_dir(from.origin.path()).unwrap().map(|entry| entry.unwrap()) {
+        std::fs::copy(entry.path(), to.join(entry.file_name())).unwrap();
+    }
+    let manifest = std::fs::read_to_string(to.join("manifest.json")).unwrap();
+    let manifest = manifest.replace(GENERATOR, "fitted").replace("0.0126", "0.0127");
+    std::fs::write(to.join("manifest.json"), manifest).unwrap();
+    bundles::open("Test", to.as_path()).unwrap()
+}
+
+fn on(folders: Arc<Folders>) -> Bench {
+    let models = models().into_iter().chain([second(&folders)]).collect();
+    Bench::keeping(folders, models)
+}
+
+fn look(bench: &mut Bench) {
     bench.send(panes(&[Pane::Predicted, Pane::Compare, Pane::Generate]));
     bench.send(LibraryCommand::Select(PairId(1)));
     bench.settle();
+}
+
+fn bench() -> Bench {
+    let mut bench = on(Folders::new());
+    look(&mut bench);
     bench
 }
 
@@ -145,8 +164,11 @@ fn another_model_is_predicted_with_at_once_on_this_pair_and_on_those_seen_before
         bench.send(LibraryCommand::Select(PairId(pair)));
         bench.settle();
     }
-    let model = |bench: &Bench| results::chosen(&bench.state, RIGHT).expect("a prediction").bundle.clone();
-    assert_eq!((&*model(&bench), bench.services.generated()), ("gen", 3));
+    let model = |bench: &Bench| {
+        let shown = results::chosen(&bench.state, RIGHT).expect("a prediction");
+        bench.state.library.bundle(&shown.bundle).unwrap().name.clone()
+    };
+    assert_eq!((&*model(&bench), bench.generated()), (GENERATOR, 3));
     bench.send(Move::Model(1).command(&bench.state).unwrap());
     assert!(results::outdated(&bench.state, RIGHT).is_some_and(|outdated| outdated.why == Why::OnItsWay));
     bench.settle();
@@ -156,10 +178,10 @@ fn another_model_is_predicted_with_at_once_on_this_pair_and_on_those_seen_before
     bench.settle();
     assert_eq!((&*model(&bench), results::outdated(&bench.state, RIGHT)), ("fitted", None));
     // Back: both are there, and nothing is made again.
-    let made = bench.services.generated();
+    let made = bench.generated();
     bench.send(Move::Model(0).command(&bench.state).unwrap());
     bench.settle();
-    assert_eq!((&*model(&bench), bench.services.generated()), ("gen", made));
+    assert_eq!((&*model(&bench), bench.generated()), (GENERATOR, made));
 }
 
 #[test]
@@ -167,22 +189,17 @@ fn a_start_with_another_model_selected_does_not_open_on_the_picture_of_the_first
     let mut first = bench();
     first.send(PredictCommand::Generate);
     first.settle();
-    let kept: Vec<_> =
-        first.state.results.predictions.iter().map(|(key, made)| (key.clone(), (**made).clone())).collect();
-    let mut again = bench();
+    let mut again = on(first.folders.clone());
     again.send(Move::Model(1).command(&again.state).unwrap());
-    *again.services.kept.lock().unwrap() = kept;
-    again.send(LibraryCommand::Select(PairId(0)));
-    again.send(LibraryCommand::Select(PairId(1)));
-    again.state.results.looked_up.clear();
-    again.settle();
+    look(&mut again);
     // Nothing is predicted by itself here: the picture from before is shown, and says whose it is.
     let outdated = results::outdated(&again.state, RIGHT).expect("it is of another model");
-    assert!(outdated.made_with.starts_with("gen ") && outdated.why == Why::NotMade, "{outdated:?}");
+    assert!(outdated.made_with.starts_with(GENERATOR) && outdated.why == Why::NotMade, "{outdated:?}");
     again.send(with(|g| g.by_itself = true));
     again.settle();
     assert_eq!(results::outdated(&again.state, RIGHT), None);
-    assert_eq!(&*results::chosen(&again.state, RIGHT).unwrap().bundle, "fitted");
+    let shown = &results::chosen(&again.state, RIGHT).unwrap().bundle;
+    assert_eq!(again.state.library.bundle(shown).unwrap().name, "fitted");
 }
 
 #[test]

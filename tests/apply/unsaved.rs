@@ -1,18 +1,18 @@
 //! Labels that cannot be saved: what is asked at closing, trying again, and where they go else.
 
-use std::path::PathBuf;
-use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use touch2touch::app::command::{LabelsCommand, LibraryCommand, UiRequest, UnsavedCommand};
+use touch2touch::app::command::{LabelsCommand, LibraryCommand, Pane, UiRequest, UnsavedCommand};
 use touch2touch::app::labels::Question;
 use touch2touch::app::library::Place;
+use touch2touch::app::services::Services;
+use touch2touch::app::source::Source;
 use touch2touch_core::rig::lab;
+use touch2touch_pipeline::io::masks::{FOLDER, MaskStore};
 
-use super::double::Bench;
+use super::bench::{Bench, Folders, PAIR, models};
 use super::masks::{bench, stroke};
-
-const PAIR: &str = "tool_a/data_0";
+use super::panes;
 
 /// One round with a command, and all that follows; whether the window closes.
 fn closes(bench: &mut Bench, command: UnsavedCommand) -> bool {
@@ -21,18 +21,19 @@ fn closes(bench: &mut Bench, command: UnsavedCommand) -> bool {
     asked.contains(&UiRequest::Close)
 }
 
-fn fill(bench: &Bench, full: bool) {
-    bench.services.source.full_disk.store(full, Ordering::Relaxed);
+fn on_disk(bench: &Bench) -> bool {
+    bench.stored(PAIR).measured(lab::RIGHT).is_some()
 }
 
-fn on_disk(bench: &Bench) -> bool {
-    bench.services.source.labels.lock().unwrap().contains_key(PAIR)
+/// What waits for the next opening.
+fn waiting(bench: &Bench) -> Source {
+    Source::open(&Place::Path(bench.folders.data.clone()), Some(&bench.folders.config.join("recovered"))).unwrap()
 }
 
 /// A stroke on a full disk.
 fn stuck() -> Bench {
     let mut bench = bench();
-    fill(&bench, true);
+    bench.fill(true);
     stroke(&mut bench, lab::RIGHT, [20.0, 1.0], [21.0, 1.0]);
     bench.settle();
     assert!(bench.state.document.failed.contains_key(PAIR) && bench.state.document.question.is_none());
@@ -57,28 +58,30 @@ fn closing_on_a_full_disk_asks_and_closes_once_it_is_saved() {
     assert_eq!(bench.state.document.question, Some(Question::Closing));
     assert_eq!(bench.errors(), 1, "it is said once, however often it is tried");
     assert!(!closes(&mut bench, UnsavedCommand::Stay));
-    fill(&bench, false);
+    bench.fill(false);
     assert!(!closes(&mut bench, UnsavedCommand::Retry), "the person stays");
     assert!(on_disk(&bench) && bench.state.document.failed.is_empty());
-    fill(&bench, true);
+    bench.fill(true);
     stroke(&mut bench, lab::RIGHT, [2.0, 1.0], [3.0, 1.0]);
     assert!(!closes(&mut bench, UnsavedCommand::Close));
-    fill(&bench, false);
+    bench.fill(false);
     assert!(closes(&mut bench, UnsavedCommand::Retry));
     assert!(bench.state.document.unsaved.is_empty());
 }
 
 #[test]
 fn what_failed_is_tried_again_after_a_while_and_only_then() {
-    let mut bench = bench();
-    bench.tick();
+    let folders = Folders::new();
+    let services = Services { retry_after: Duration::from_millis(30), ..folders.services(false) };
+    let mut bench = Bench::with(folders, services, models());
+    bench.send(panes(&[Pane::Measured, Pane::Masks]));
+    bench.settle();
     assert_eq!(bench.runtime.next_tick(), None, "an idle window sleeps");
-    bench.services.retry_ms.store(30, Ordering::Relaxed);
-    fill(&bench, true);
+    bench.fill(true);
     stroke(&mut bench, lab::RIGHT, [20.0, 1.0], [21.0, 1.0]);
     bench.settle();
     assert!(bench.runtime.next_tick().is_some_and(|wait| wait <= Duration::from_millis(30)));
-    fill(&bench, false);
+    bench.fill(false);
     let begin = Instant::now();
     while !on_disk(&bench) {
         assert!(begin.elapsed() < Duration::from_secs(30));
@@ -97,23 +100,23 @@ fn discarding_closes_and_leaves_nothing_and_ending_otherwise_keeps_it() {
     closes(&mut bench, UnsavedCommand::Close);
     assert!(closes(&mut bench, UnsavedCommand::Discard));
     bench.runtime.finish(&mut bench.state);
-    assert!(bench.services.source.waiting.lock().unwrap().is_empty() && !on_disk(&bench));
+    bench.fill(false);
+    assert!(waiting(&bench).recovered.pairs.is_empty() && !on_disk(&bench));
 
     let mut bench = stuck();
     // One more, of which the disk heard nothing when the end came.
     stroke(&mut bench, lab::RIGHT, [2.0, 14.0], [3.0, 14.0]);
     bench.runtime.finish(&mut bench.state);
-    let waiting = bench.services.source.waiting.lock().unwrap().clone();
-    let [(None, kept)] = &waiting[..] else { panic!("{waiting:?}") };
-    assert_eq!(kept.name, PAIR);
-    let mask = &kept.labels.measured(lab::RIGHT).unwrap().mask;
+    bench.fill(false);
+    assert_eq!(waiting(&bench).recovered.pairs, [PAIR]);
+    let mask = bench.stored(PAIR).measured(lab::RIGHT).unwrap().mask.clone();
     assert!(mask[(20, 1)] && mask[(2, 14)]);
 }
 
 #[test]
 fn a_data_set_that_went_away_is_asked_about_at_once_for_each_new_stroke() {
     let mut bench = bench();
-    bench.services.source.lost.store(true, Ordering::Relaxed);
+    bench.lose(true);
     stroke(&mut bench, lab::RIGHT, [20.0, 1.0], [21.0, 1.0]);
     bench.settle();
     assert_eq!(bench.state.document.question, Some(Question::Lost));
@@ -123,7 +126,7 @@ fn a_data_set_that_went_away_is_asked_about_at_once_for_each_new_stroke() {
     stroke(&mut bench, lab::RIGHT, [2.0, 1.0], [3.0, 1.0]);
     bench.settle();
     assert_eq!(bench.state.document.question, Some(Question::Lost));
-    bench.services.source.lost.store(false, Ordering::Relaxed);
+    bench.lose(false);
     assert!(!closes(&mut bench, UnsavedCommand::Retry), "it came back: that closes the question, not the window");
     assert!(bench.state.document.question.is_none() && on_disk(&bench));
 }
@@ -132,7 +135,7 @@ fn a_data_set_that_went_away_is_asked_about_at_once_for_each_new_stroke() {
 fn what_is_saved_elsewhere_is_saved_unless_it_changed_meanwhile() {
     let mut bench = stuck();
     closes(&mut bench, UnsavedCommand::Close);
-    let folder = PathBuf::from("usb");
+    let folder = bench.folders.data.with_file_name("usb");
     bench.send(LabelsCommand::Unsaved(UnsavedCommand::Elsewhere(folder.clone())));
     // Drawn while that is being written.
     stroke(&mut bench, lab::RIGHT, [2.0, 14.0], [3.0, 14.0]);
@@ -141,25 +144,27 @@ fn what_is_saved_elsewhere_is_saved_unless_it_changed_meanwhile() {
     assert!(closes(&mut bench, UnsavedCommand::Elsewhere(folder.clone())));
     let doc = &bench.state.document;
     assert!(doc.unsaved.is_empty() && doc.failed.is_empty() && doc.elsewhere.contains(PAIR));
-    let waiting = bench.services.source.waiting.lock().unwrap().clone();
-    assert_eq!(waiting.iter().map(|(to, _)| to.clone()).collect::<Vec<_>>(), [Some(folder.clone()), Some(folder)]);
-    assert!(waiting[1].1.labels.measured(lab::RIGHT).unwrap().mask[(2, 14)]);
+    let kept = MaskStore::in_folder(folder.join(FOLDER)).load(PAIR, lab::RIGHT).unwrap().unwrap();
+    assert!(kept.mask[(20, 1)] && kept.mask[(2, 14)]);
 }
 
 #[test]
 fn another_data_set_does_not_cost_what_could_not_be_saved() {
     let mut bench = stuck();
-    bench.send(LibraryCommand::Open(Place::Path("another".into())));
+    let another = bench.another();
+    bench.send(LibraryCommand::Open(another));
     bench.settle();
     assert!(bench.state.document.unsaved.is_empty());
-    assert_eq!(bench.services.source.waiting.lock().unwrap().len(), 1);
+    bench.fill(false);
+    assert_eq!(waiting(&bench).recovered.pairs, [PAIR]);
     // What fails only after the other one is open.
     let mut bench = super::masks::bench();
-    fill(&bench, true);
-    bench.send(LibraryCommand::Open(Place::Path("another".into())));
+    bench.fill(true);
+    let another = bench.another();
+    bench.send(LibraryCommand::Open(another));
     stroke(&mut bench, lab::RIGHT, [20.0, 1.0], [21.0, 1.0]);
     bench.settle();
-    let kept = bench.services.source.waiting.lock().unwrap().clone();
-    assert_eq!(kept.len(), 1, "{kept:?}");
-    assert!(kept[0].1.labels.measured(lab::RIGHT).is_some());
+    bench.fill(false);
+    assert_eq!(waiting(&bench).recovered.pairs, [PAIR]);
+    assert!(on_disk(&bench));
 }

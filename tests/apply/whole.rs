@@ -1,29 +1,26 @@
 //! With a simulated grasp: masks, clouds, poses; with threads; without models.
 
-use std::sync::atomic::Ordering;
 use std::sync::{Arc, Condvar, Mutex};
 
 use touch2touch::app::action::Action;
 use touch2touch::app::command::{Command, LabelsCommand, LibraryCommand, Pane, PredictCommand};
-use touch2touch::app::keys::{ImprintSource, PoseKey, ProvisionalPoseKey, Registration};
-use touch2touch::app::library::Place;
+use touch2touch::app::keys::{ImprintSource, Registration};
 use touch2touch::app::runtime::Runtime;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{ColorRange, MaskSource, MaskTool};
-use touch2touch::app::state::results::Request;
-use touch2touch::app::state::{Absent, Lookup, State};
+use touch2touch::app::state::{Absent, Lookup};
 use touch2touch::app::{demand, results};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::lab;
 
-use super::double::{Bench, Double, SIMULATED};
+use super::bench::{self, Bench, Folders, SHALLOW, SIMULATED};
 use super::panes;
 
 const MEASURED: ImprintSource = ImprintSource::Measured;
 
 #[test]
 fn the_pose_follows_the_mask() {
-    let mut bench = Bench::open_simulated();
+    let mut bench = Bench::open();
     bench.send(panes(&[Pane::Scene, Pane::Measured]));
     bench.send(prefer(|s| s.mask.choice.source = MaskSource::Cad));
     bench.send(LibraryCommand::Select(SIMULATED));
@@ -68,45 +65,15 @@ fn the_pose_follows_the_mask() {
 }
 
 #[test]
-fn a_pose_that_takes_a_proof_is_shown_without_it_first() {
-    let mut bench = Bench::open_simulated();
-    bench.send(panes(&[Pane::Scene, Pane::Measured]));
-    bench.send(prefer(|s| s.registration = Registration::DistanceField(None)));
-    bench.send(prefer(|s| s.mask.choice.source = MaskSource::Cad));
-    bench.send(LibraryCommand::Select(SIMULATED));
-    bench.settle();
-    let key = |bench: &Bench| results::pose_key(&bench.state, MEASURED).unwrap().unwrap();
-    let settled = key(&bench);
-    let both = |bench: &Bench, key: &PoseKey| {
-        let results = &bench.state.results;
-        let provisional = results.provisional_poses.get(&ProvisionalPoseKey(key.clone())).unwrap().clone();
-        (provisional, results.poses.get(key).unwrap().clone())
-    };
-    let (provisional, pose) = both(&bench, &settled);
-    assert!(Arc::ptr_eq(&provisional, &pose), "a good mask is registered once");
-    assert!(results::provisional_pose(&bench.state, MEASURED).is_none());
-    // All that is deeper than a threshold: no cheap search settles it.
-    bench.send(prefer(|s| s.mask.choice.source = MaskSource::Threshold));
-    bench.settle();
-    let (provisional, pose) = both(&bench, &key(&bench));
-    assert!(pose.report.certificate.is_some() && provisional.report.certificate.is_none());
-    // As it was between the two: the provisional one is shown and may not be accepted, the other one is wanted.
-    bench.state.results.poses.clear();
-    let shown = results::pose(&bench.state, MEASURED);
-    assert!(matches!(shown, Lookup::Stale(_)) && shown.shown().unwrap().angle_rad == provisional.angle_rad);
-    assert!(results::provisional_pose(&bench.state, MEASURED).is_some());
-    assert!(Action::AcceptMeasuredPose.command(&bench.state).is_none());
-    assert_eq!(demand::demands(&bench.state).first(), Some(&Request::Pose(key(&bench))));
-}
-
-#[test]
 fn a_source_without_camera_says_why_there_is_no_pose() {
     let mut bench = Bench::open();
+    let pictures = bench.another();
+    bench.send(LibraryCommand::Open(pictures));
     bench.send(panes(&[Pane::Scene, Pane::Measured]));
     bench.settle();
     assert!(matches!(results::cloud(&bench.state, MEASURED), Lookup::Absent(Absent::NoCamera)));
     assert!(bench.state.tasks.is_idle());
-    for (source, absent) in [(MaskSource::Truth, Absent::NotSimulated), (MaskSource::Cad, Absent::NoTruth)] {
+    for (source, absent) in [(MaskSource::Truth, Absent::NotSimulated), (MaskSource::Cad, Absent::NoTool)] {
         bench.send(prefer(move |s| s.mask.choice.source = source));
         bench.settle();
         match results::mask_in_force(&bench.state, MEASURED, lab::RIGHT) {
@@ -122,13 +89,13 @@ fn a_source_without_camera_says_why_there_is_no_pose() {
 #[test]
 fn where_the_mask_model_finds_nothing_depth_decides_and_label_and_log_say_so() {
     let mut bench = Bench::open();
-    bench.services.blind.store(true, Ordering::Relaxed);
+    bench.send(LibraryCommand::Select(SHALLOW));
     bench.send(panes(&[Pane::Measured]));
     bench.send(prefer(|s| s.mask.choice.source = MaskSource::Unet));
     bench.settle();
     let shown = results::mask_in_force(&bench.state, MEASURED, lab::RIGHT).unwrap();
     assert!(shown.label.starts_with("Depth ") && shown.label.contains("found no contact"), "{}", shown.label);
-    assert_eq!(shown.mask.as_slice().iter().filter(|m| **m).count(), 35 + 4, "the ring and the spot");
+    assert!(shown.mask.as_slice().contains(&true));
     let said = |bench: &Bench| bench.state.log.entries.iter().filter(|e| e.text.contains("found no contact")).count();
     assert_eq!(said(&bench), 1, "{:#?}", bench.state.log.entries);
     // The other finger says so when it is looked at, and a source that finds contact says nothing.
@@ -140,7 +107,9 @@ fn where_the_mask_model_finds_nothing_depth_decides_and_label_and_log_say_so() {
 
 #[test]
 fn without_models_the_rest_works_and_a_notice_says_what_to_do() {
-    let mut bench = Bench::open_without_models();
+    let folders = Folders::new();
+    let services = folders.services(false);
+    let mut bench = Bench::with(folders, services, Vec::new());
     bench.send(panes(&[Pane::Measured, Pane::Predicted]));
     bench.settle();
     assert!(bench.state.log.entries.iter().any(|e| e.text.contains("No generator") && e.hint.is_some()));
@@ -152,16 +121,16 @@ fn without_models_the_rest_works_and_a_notice_says_what_to_do() {
 
 #[test]
 fn threads_give_the_same_and_wake_the_window() {
-    let services = Arc::new(Double::new(false, true));
+    let folders = Folders::new();
     let woken = Arc::new((Mutex::new(false), Condvar::new()));
     let bell = woken.clone();
     let wake = Arc::new(move || {
         *bell.0.lock().unwrap() = true;
         bell.1.notify_one();
     });
-    let mut runtime = Runtime::threads(services.clone(), wake);
-    let mut state = State::default();
-    runtime.start(&mut state, Some(Place::Demo));
+    let mut runtime = Runtime::threads(Arc::new(folders.services(false)), wake);
+    let mut state = bench::state();
+    runtime.tick(&mut state, folders.start(bench::models()));
     runtime.tick(&mut state, vec![panes(&[Pane::Measured, Pane::Predicted, Pane::Compare])]);
     let mut asked = false;
     while results::comparison(&state, lab::RIGHT).ready().is_none() {
@@ -179,7 +148,6 @@ fn threads_give_the_same_and_wake_the_window() {
             runtime.tick(&mut state, Vec::new());
         }
     }
-    assert_eq!(services.source.loads_of(0), 1);
     assert_eq!(results::chosen(&state, lab::RIGHT).unwrap().config.seed, 42);
 }
 

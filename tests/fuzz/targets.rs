@@ -3,8 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use sha2::Digest as _;
-use touch2touch::app::services::Services as _;
-use touch2touch::app::services::live::LiveServices;
+use touch2touch::app::services::Services;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::grid::{Grid, Mask};
@@ -357,7 +356,7 @@ fn read_prediction(dir: &Path, file: &Path) -> Outcome {
 
 fn settings_seeds() -> Vec<Seed> {
     let dir = tempfile::tempdir().unwrap();
-    let services = LiveServices::with_config_folder(Some(dir.path().to_owned()));
+    let services = Services::with_config_folder(Some(dir.path().to_owned()));
     services.save_settings(&Default::default()).unwrap();
     let whole = std::fs::read_to_string(dir.path().join("settings.json")).unwrap();
     vec![
@@ -368,7 +367,7 @@ fn settings_seeds() -> Vec<Seed> {
 }
 
 fn read_settings(dir: &Path, _: &Path) -> Outcome {
-    match LiveServices::with_config_folder(Some(dir.to_owned())).load_settings().1 {
+    match Services::with_config_folder(Some(dir.to_owned())).load_settings().1 {
         Some(problem) => Err(format!("{}: {}", problem.what, problem.why)),
         None => Ok(()),
     }

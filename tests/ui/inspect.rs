@@ -1,4 +1,4 @@
-//! The time machine, by keys and clicks.
+//! The steps of a registration, by keys and clicks.
 
 use eframe::egui::{Key, Modifiers, vec2};
 use egui_kittest::kittest::Queryable as _;
@@ -42,17 +42,17 @@ impl Rig {
         let mut rig = Self::new(SIZE, 2)?;
         rig.send(prefer(|s| s.hint_dismissed = true));
         rig.send(prefer(|s| s.mask.choice.source = MaskSource::Truth));
-        assert!(rig.harness.state().state().results.inspections.is_empty(), "nobody looks yet");
+        assert!(rig.harness.state().state().results.runs.is_empty(), "nobody looks yet");
         rig.send(prefer(|s| s.workspace = Workspace::Align));
         Some(rig)
     }
 }
 
 #[test]
-fn scrub_by_keys_pin_two_and_compare() {
+fn steps_by_keys_by_the_slider_and_in_the_curves() {
     let Some(mut rig) = Rig::align() else { return };
     let state = rig.harness.state().state();
-    assert!(state.selection.panes.contains(&Pane::TimeMachine));
+    assert!(state.selection.panes.contains(&Pane::Steps));
     let shown = results::inspected(state).expect("the winner's last step");
     let (run, last) = (shown.run, shown.at);
     assert!(shown.is_last() && last > 3);
@@ -61,7 +61,6 @@ fn scrub_by_keys_pin_two_and_compare() {
         results::pose(state, ImprintSource::Measured).ready().unwrap().grasp_from_object,
         "at its end it shows the registered pose"
     );
-    rig.tap(Modifiers::NONE, Key::J);
     rig.tap(Modifiers::NONE, Key::Comma);
     rig.tap(Modifiers::NONE, Key::Comma);
     assert_eq!(rig.at(), [run, last - 2]);
@@ -69,24 +68,13 @@ fn scrub_by_keys_pin_two_and_compare() {
     assert_eq!(rig.at(), [run, last - 1]);
     rig.tap(Modifiers::SHIFT, Key::Comma);
     assert_eq!(rig.at(), [run, 0]);
-    rig.tap(Modifiers::NONE, Key::J);
-    rig.shoot("test-time-machine-pins");
-    let [Some(a), Some(b)] = rig.harness.state().state().inspect.pins_of(rig.harness.state().state().pair_key()) else {
-        panic!("two pins")
-    };
-    assert_eq!((a.at, b.at), (last, 0));
-    // Both columns and their difference are on screen.
-    assert!(rig.harness.get_all_by_label_contains("Angle °").next().is_some());
-    rig.harness.get_by_label("Remove step A").click();
-    rig.harness.step();
-    rig.settle();
-    assert!(rig.harness.state().state().inspect.pins_of(rig.harness.state().state().pair_key())[0].is_none());
+    rig.shoot("test-steps");
     // The slider, the buttons and the curves do the same.
     rig.harness.get_by_label("Last step").click();
     rig.harness.step();
     rig.settle();
     assert_eq!(rig.at(), [run, last]);
-    rig.click_in("Cost and inliers over the steps", [0.35, 0.5]);
+    rig.click_in("Cost over the steps", [0.35, 0.5]);
     let [_, at] = rig.at();
     assert!(at > 0 && at < last, "{at}");
     // Another start by its button.
@@ -94,5 +82,5 @@ fn scrub_by_keys_pin_two_and_compare() {
     rig.harness.step();
     rig.settle();
     assert_eq!(rig.at()[0], 0);
-    assert_eq!(rig.harness.state().state().results.inspections.len(), 1, "scrubbing registers nothing");
+    assert_eq!(rig.harness.state().state().results.runs.len(), 1, "scrubbing registers nothing");
 }

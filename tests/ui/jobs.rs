@@ -55,11 +55,11 @@ fn two_models_are_compared_on_the_pair_on_screen() {
     let other = models.into_iter().find(|name| *name != shown).expect("a second generator");
     person.click("B: Measured");
     person.click(&other);
-    let versus = person.state().settings.compared();
-    assert_eq!(versus.a, Subject::shown());
-    assert_eq!(versus.b.change().and_then(|change| change.bundle.clone()), Some(other));
+    let compared = person.state().settings.compared();
+    assert_eq!(compared.a, Subject::shown());
+    assert_eq!(compared.b.change().and_then(|change| change.bundle.clone()), Some(other));
     let found =
-        results::subjects_compared(person.state(), &versus.a, &versus.b, lab::RIGHT).ready().expect("the figures");
+        results::subjects_compared(person.state(), &compared.a, &compared.b, lab::RIGHT).ready().expect("the figures");
     assert!(found.mae_m > 0.0);
     assert!(person.actions <= 3, "{} actions", person.actions);
     person.rig.shoot("job-two-models");

@@ -55,17 +55,12 @@ fn pictures_for_the_docs() {
         rig.send(PredictCommand::Generate);
         rig.shoot(&format!("{name}-demo-inspect"));
         rig.send(prefer(|s| s.workspace = Workspace::Align));
-        rig.send(Command::Inspect(InspectCommand::Pin));
         rig.send(Command::Inspect(InspectCommand::Begin));
-        rig.send(Command::Inspect(InspectCommand::Pin));
         rig.send(Command::Inspect(InspectCommand::By(4)));
         rig.shoot(&format!("{name}-demo-align"));
         rig.send(Command::Inspect(InspectCommand::Start(Some(STRAY))));
         rig.shoot(&format!("{name}-demo-align-start"));
         rig.send(Command::Inspect(InspectCommand::Start(None)));
-        for pin in 0..2 {
-            rig.send(Command::Inspect(InspectCommand::Unpin(pin)));
-        }
         for layer in [Layer::Residuals, Layer::Reasons] {
             rig.send(Command::Workbench(WorkbenchCommand::SetLayer(layer)));
             rig.shoot(&format!("{name}-demo-align-{}", layer.name()).to_lowercase());

@@ -2,7 +2,7 @@
 
 use eframe::egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::command::{Command, LibraryCommand, Pane, UiRequest, ViewCommand};
+use touch2touch::app::command::{Command, LibraryCommand, Pane};
 use touch2touch::app::evaluate::EvaluateCommand;
 use touch2touch::app::library::{Place, Sort};
 use touch2touch::app::results;
@@ -24,7 +24,7 @@ fn a_table_is_made_by_a_click_shown_and_exported() {
     assert!(rig.harness.state().state().selection.panes.contains(&Pane::Results));
     rig.shoot("results-before");
 
-    rig.harness.get_by_label("Evaluate the data set").click();
+    rig.harness.get_by_label("Predict all").click();
     rig.harness.step();
     rig.settle();
     let table = rig.harness.state().state().table.result.clone().expect("the table is there");
@@ -54,7 +54,7 @@ fn a_table_is_made_by_a_click_shown_and_exported() {
     for (source, scores) in table.scores.iter().enumerate() {
         for grasp in &scores.grasps {
             let index = &rig.harness.state().state().library.open.as_ref().unwrap().source.clone();
-            let pair = index.index().pairs.iter().position(|entry| entry.name == grasp.pair).unwrap() as u32;
+            let pair = index.dataset.index.pairs.iter().position(|entry| entry.name == grasp.pair).unwrap() as u32;
             assert_eq!(value(&rig, source, pair, Metric::Angle), grasp.angle_error_rad);
             assert_eq!(value(&rig, source, pair, Metric::Psnr), grasp.metric(Metric::Psnr));
         }
@@ -73,15 +73,13 @@ fn a_table_is_made_by_a_click_shown_and_exported() {
     rig.shoot("results-worst");
 
     // By another score, the other way round, from the table's heading.
-    rig.send(ViewCommand::Ui(UiRequest::ShowPane(Pane::Table)));
-    let generator = rig.harness.state().state().table.scores.sources[1].short().to_owned();
-    let heading = format!("Sort by PSNR of {generator}");
+    let heading = "Sort by PSNR";
     let listed = |rig: &Rig| {
         let state = rig.harness.state().state();
         state.library.order.iter().map(|pair| value(rig, 1, pair.0, Metric::Psnr).unwrap()).collect::<Vec<f64>>()
     };
     for best_first in [false, true] {
-        rig.harness.get_by_label(&heading).click();
+        rig.harness.get_by_label(heading).click();
         rig.harness.step();
         rig.settle();
         let found = listed(&rig);
@@ -93,6 +91,26 @@ fn a_table_is_made_by_a_click_shown_and_exported() {
     rig.send(LibraryCommand::SetFilter(format!("psnr<{bound}")));
     assert_eq!(listed(&rig), psnr[2..]);
     rig.send(LibraryCommand::SetFilter(String::new()));
+
+    // Seven columns at most, and the rest on demand.
+    let headings = |rig: &Rig| {
+        let all = ["PSNR dB", "clean dB", "SSIM", "angle °", "≤5° %", "≤10° %", "place mm", "IoU", "verdict"];
+        let sorted =
+            ["PSNR", "PSNR noise-free", "SSIM", "Angle error", "Verdict"].map(|name| format!("Sort by {name}"));
+        let is_there = |label: &str| rig.harness.query_all_by_label(label).next().is_some();
+        all.iter().filter(|label| is_there(label)).count() + sorted.iter().filter(|label| is_there(label)).count()
+    };
+    let few = headings(&rig);
+    assert!((5..=7).contains(&few), "{few}");
+    rig.harness.get_by_label("more columns").click();
+    rig.harness.step();
+    rig.settle();
+    assert!(headings(&rig) > few);
+    // A click on a method has the pairs show its scores.
+    rig.harness.get_by_label(&format!("{}: 4 grasps, 8 images", table.rows[0].method)).click();
+    rig.harness.step();
+    rig.settle();
+    assert!(rig.harness.state().state().table.by().unwrap().0.upper_bound);
 
     // A table is of one data set.
     rig.send(LibraryCommand::Open(Place::Demo));

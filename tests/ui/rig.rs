@@ -1,193 +1,36 @@
 //! A studio on a small simulated data set, without a window.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Condvar, Mutex};
+use std::sync::Arc;
+use std::time::Duration;
 
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::command::{Command, Opened};
+use touch2touch::app::command::Command;
 use touch2touch::app::library::Place;
 use touch2touch::app::results;
 use touch2touch::app::services::Services;
-use touch2touch::app::services::live::LiveServices;
-use touch2touch::app::settings::Settings;
+use touch2touch::app::settings::{MaskSource, Settings};
 use touch2touch::app::state::State;
 use touch2touch::ui::{Options, StudioApp};
 use touch2touch_core::catalog::{self, ToolSpec};
-use touch2touch_core::contact::ContactMask;
-use touch2touch_core::diffusion::GenerateConfig;
-use touch2touch_core::grid::{DepthMap, Grid, RgbGrid};
-use touch2touch_core::postprocess::{
-    DepthChain, DepthRange, Mapping, RawPrediction, Reduction, Shift, ShiftMode, ShiftStats,
-};
-use touch2touch_core::resample::Resampling;
-use touch2touch_core::rig::lab;
 use touch2touch_core::sim;
-use touch2touch_pipeline::error::TaskError;
-use touch2touch_pipeline::infer::bundle::Origin;
-use touch2touch_pipeline::infer::bundle::SensorPair;
-use touch2touch_pipeline::infer::engine::EngineChoice;
 use touch2touch_pipeline::io::simulated::{Layout, pair_paths, write_pair, write_tools};
-use touch2touch_pipeline::io::statistics::ShiftStatistics;
-use touch2touch_pipeline::job::{JobCx, PreviewPicture};
-use touch2touch_pipeline::steps::bundles::{BundleInfo, BundleKind, GeneratorInfo};
-use touch2touch_pipeline::steps::imprint::in_meters;
-use touch2touch_pipeline::steps::models::GenerateInput;
-use touch2touch_pipeline::steps::prediction::Prediction;
 
-/// The program's services with a generator that answers at once.
-struct QuickGenerator {
-    live: LiveServices,
-    /// Holds every generation up after its preview of step 4, until it is opened.
-    gate: Option<Arc<Gate>>,
+/// The program's services, which wait for nothing, with these preferences beside what a test of the others asks for:
+/// predictions are asked for, masks come from the threshold.
+fn services(config: &Path, change: impl FnOnce(&mut Settings)) -> Arc<Services> {
+    let services = Services { patience: Duration::ZERO, ..Services::with_config_folder(Some(config.to_owned())) };
+    let mut settings = services.load_settings().0;
+    settings.generate.by_itself = false;
+    settings.about_own_data = false;
+    change(&mut settings);
+    services.save_settings(&settings).unwrap();
+    Arc::new(services)
 }
 
-/// Closed until somebody opens it.
-#[derive(Default)]
-pub(super) struct Gate {
-    open: Mutex<bool>,
-    bell: Condvar,
-}
-
-impl Gate {
-    pub(super) fn open(&self) {
-        *self.open.lock().unwrap() = true;
-        self.bell.notify_all();
-    }
-
-    fn pass(&self) {
-        let mut open = self.open.lock().unwrap();
-        while !*open {
-            open = self.bell.wait(open).unwrap();
-        }
-    }
-}
-
-/// A picture of the decoder's kind that depends on the input and the seed: the blurred strength of the difference.
-fn picture(difference: &RgbGrid, seed: u64) -> Grid<f32> {
-    const N: usize = 64;
-    let (w, h) = (difference.width(), difference.height());
-    Grid::from_fn(N, N, |x, y| {
-        let mut sum = 0.0;
-        for dy in 0..4 {
-            for dx in 0..4 {
-                let p = difference[((x * 4 + dx) * w / (4 * N), (y * 4 + dy) * h / (4 * N))];
-                sum += p.iter().map(|v| v.abs()).sum::<f32>();
-            }
-        }
-        (sum / 16.0 / 60.0 - 0.6 + (seed % 7) as f32 * 0.01).clamp(-1.0, 1.0)
-    })
-}
-
-impl Services for QuickGenerator {
-    fn open(&self, place: &Place) -> Result<Opened, TaskError> {
-        self.live.open(place)
-    }
-
-    fn find_bundles(&self, _folders: &[PathBuf]) -> (Vec<BundleInfo>, Vec<TaskError>) {
-        let info = BundleInfo {
-            id: "quick".into(),
-            name: "quick double".into(),
-            kind: BundleKind::Generator,
-            origin: Origin::Folder(PathBuf::new()),
-            generator: Some(GeneratorInfo {
-                fit: None,
-                defaults: GenerateConfig { steps: 4, ..GenerateConfig::default() },
-                training_steps: 1000,
-                guided: false,
-                sensors: SensorPair::of(&lab::GELSLIM, &lab::BUBBLE),
-            }),
-            trained: false,
-        };
-        (vec![info], Vec::new())
-    }
-
-    fn predict(
-        &self,
-        bundle: &BundleInfo,
-        _engine: EngineChoice,
-        config: &GenerateConfig,
-        wanted: &[GenerateInput<'_>],
-        cx: &JobCx,
-    ) -> Result<Vec<Prediction>, TaskError> {
-        let steps = config.steps;
-        for step in 0..steps {
-            cx.check("Generate")?;
-            cx.progress(step.into(), steps.into(), format!("step {} of {steps}", step + 1));
-        }
-        let chain = DepthChain {
-            range: DepthRange { min_m: -0.0063, max_m: 0.018 },
-            mapping: Mapping::Doubled,
-            reduction: Reduction::Mean,
-            shift: Shift::None,
-            correction: None,
-            size: [lab::BUBBLE.width, lab::BUBBLE.height],
-            resampling: Resampling::Bilinear,
-            rotation_deg: 180,
-            window: None,
-            offset: [0.0; 2],
-        };
-        let stats = ShiftStats { pred_mean: 0.0115, pred_std: 0.0021, gt_mean: 0.0052, gt_std: 0.0043 };
-        let chains: BTreeMap<ShiftMode, Result<DepthChain, String>> = ShiftMode::ALL
-            .into_iter()
-            .map(|mode| (mode, chain.clone().with_mode(mode, Some(stats)).map_err(|e| e.to_string())))
-            .collect();
-        if let Some(gate) = &self.gate {
-            for (at, item) in wanted.iter().enumerate() {
-                if let Some((previews, shift)) = cx.previews().and_then(|p| Some((p, p.wants(at, 4)?))) {
-                    let raw = RawPrediction { channels: vec![picture(item.difference, item.seed)] };
-                    let depth = in_meters(chains[&shift].as_ref().unwrap(), &raw, item.size).unwrap();
-                    previews.show(at, PreviewPicture { step: 4, of: steps, depth });
-                }
-            }
-            gate.pass();
-        }
-        let chains = Arc::new(chains);
-        let one = |item: &GenerateInput<'_>| {
-            // Three channels around one picture, as three-channel decoders give it.
-            let mean = picture(item.difference, item.seed);
-            let raw = RawPrediction { channels: [-0.02, 0.0, 0.02].map(|off| mean.map(|v| v + off)).to_vec() };
-            let (chains, bundle) = (chains.clone(), bundle.id.clone());
-            Prediction {
-                raw,
-                chains,
-                fit: None,
-                color: None,
-                bundle,
-                engine: "double".into(),
-                seconds: 0.0,
-                kept: false,
-            }
-        };
-        Ok(wanted.iter().map(one).collect())
-    }
-
-    fn mask_by_model(
-        &self,
-        bundle: &BundleInfo,
-        runtime: EngineChoice,
-        imprint: &DepthMap,
-        probability: Option<f32>,
-    ) -> Result<ContactMask, TaskError> {
-        self.live.mask_by_model(bundle, runtime, imprint, probability)
-    }
-
-    fn save_statistics(&self, statistics: &ShiftStatistics) -> Result<Option<PathBuf>, TaskError> {
-        self.live.save_statistics(statistics)
-    }
-
-    fn load_settings(&self) -> (Settings, Option<TaskError>) {
-        // Predictions are asked for: a test that is about the others switches them on.
-        let (mut settings, problem) = self.live.load_settings();
-        settings.generate.by_itself = false;
-        settings.about_own_data = false;
-        (settings, problem)
-    }
-
-    fn save_settings(&self, settings: &Settings) -> Result<(), TaskError> {
-        self.live.save_settings(settings)
-    }
+fn by_threshold(settings: &mut Settings) {
+    settings.mask.choice.source = MaskSource::Threshold;
 }
 
 /// Writes a data set of a few simulated grasps of two tools.
@@ -226,12 +69,14 @@ impl Rig {
         let folder = tempfile::tempdir().unwrap();
         let (data, config) = (folder.path().join("data"), folder.path().join("config"));
         write_tools_touched(&data, &catalog::tools()[..2], grasps);
-        let mut rig = Self { harness: Self::start(size, &data, &config), data, config, _folder: folder };
+        let services = services(&config, by_threshold);
+        let harness = Self::build(size, services, Some(data.clone()), true);
+        let mut rig = Self { harness, data, config, _folder: folder };
         rig.settle();
         Some(rig)
     }
 
-    /// As [`Rig::new`] on `pairs` pairs of one tool that are the same files, read on lanes of their own while frames go on.
+    /// As [`Rig::new`] on `pairs` pairs of one tool that are the same files, read on workers of their own while frames go on.
     pub(super) fn paging(size: [f32; 2], pairs: u64) -> Option<Self> {
         crate::support::gpu()?;
         let folder = tempfile::tempdir().unwrap();
@@ -245,36 +90,30 @@ impl Rig {
                 std::fs::hard_link(file, again).unwrap();
             }
         }
-        let live = LiveServices::with_config_folder(Some(config.clone()));
-        let services = Arc::new(QuickGenerator { live, gate: None });
+        let services = services(&config, by_threshold);
         let mut rig =
             Self { harness: Self::build(size, services, Some(data.clone()), false), data, config, _folder: folder };
         rig.until("the first pair", |state| state.library.open.is_some() && results::sample(state).ready().is_some());
         Some(rig)
     }
 
-    /// As [`Rig::new`] with lanes of its own, and a generator that stops after its preview until the gate is opened.
-    pub(super) fn gated(size: [f32; 2]) -> Option<(Self, Arc<Gate>)> {
+    /// As [`Rig::new`] with workers of its own.
+    pub(super) fn threaded(size: [f32; 2]) -> Option<Self> {
         let mut rig = Self::new(size, 1)?;
-        let gate = Arc::new(Gate::default());
-        let live = LiveServices::with_config_folder(Some(rig.config.clone()));
-        let services = Arc::new(QuickGenerator { live, gate: Some(gate.clone()) });
-        rig.harness = Self::build(size, services, Some(rig.data.clone()), false);
+        rig.harness = Self::build(size, services(&rig.config, |_| {}), Some(rig.data.clone()), false);
         rig.until("the data set", |state| state.library.open.is_some() && results::sample(state).ready().is_some());
-        Some((rig, gate))
+        Some(rig)
     }
 
-    /// As [`Rig::new`] with the program's own services, the tiny bundles of the tests and one of them chosen.
+    /// As [`Rig::new`] with the tiny bundles of the tests and one of them chosen.
     pub(super) fn with_bundle(size: [f32; 2], name: &str) -> Option<Self> {
         let mut rig = Self::new(size, 1)?;
-        let services = LiveServices::with_config_folder(Some(rig.config.clone()));
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles");
-        let mut settings = Settings { bundle_folders: vec![folder], ..Settings::default() };
-        settings.generate.bundle = Some(name.to_owned());
-        settings.generate.by_itself = false;
-        settings.about_own_data = false;
-        services.save_settings(&settings).unwrap();
-        rig.harness = Self::build(size, Arc::new(services), Some(rig.data.clone()), true);
+        let services = services(&rig.config, |settings| {
+            settings.bundle_folders = vec![Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles")];
+            settings.generate.bundle = Some(name.to_owned());
+            settings.mask.choice.source = MaskSource::default();
+        });
+        rig.harness = Self::build(size, services, Some(rig.data.clone()), true);
         rig.settle();
         Some(rig)
     }
@@ -301,10 +140,7 @@ impl Rig {
         crate::support::gpu()?;
         let folder = tempfile::tempdir().unwrap();
         let (data, config) = (folder.path().join("data"), folder.path().join("config"));
-        let services = Arc::new(LiveServices::with_config_folder(Some(config.clone())));
-        let mut settings = Settings { about_own_data: about, ..Settings::default() };
-        settings.generate.by_itself = false;
-        services.save_settings(&settings).unwrap();
+        let services = services(&config, |settings| settings.about_own_data = about);
         let open = match place {
             Place::Demo => None,
             Place::Path(path) => Some(path),
@@ -315,14 +151,9 @@ impl Rig {
         Some(rig)
     }
 
-    fn start(size: [f32; 2], data: &Path, config: &Path) -> Harness<'static, StudioApp> {
-        let live = LiveServices::with_config_folder(Some(config.to_owned()));
-        Self::build(size, Arc::new(QuickGenerator { live, gate: None }), Some(data.to_owned()), true)
-    }
-
     fn build(
         size: [f32; 2],
-        services: Arc<dyn Services>,
+        services: Arc<Services>,
         open: Option<PathBuf>,
         inline: bool,
     ) -> Harness<'static, StudioApp> {
@@ -335,8 +166,7 @@ impl Rig {
     pub(super) fn painted_whole(&self, size: [f32; 2]) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let config = folder.path().join("config");
-        let live = LiveServices::with_config_folder(Some(config.clone()));
-        let mut options = Options::new(Arc::new(QuickGenerator { live, gate: None }), Some(self.data.clone()));
+        let mut options = Options::new(services(&config, by_threshold), Some(self.data.clone()));
         options.inline = true;
         options.whole_frames = true;
         let harness = Self::build_with(size, options);
@@ -356,7 +186,7 @@ impl Rig {
 
     /// Closes the studio and starts it again on the same folders.
     pub(super) fn restart(&mut self, size: [f32; 2]) {
-        self.harness = Self::start(size, &self.data, &self.config);
+        self.harness = Self::build(size, services(&self.config, |_| {}), Some(self.data.clone()), true);
         self.settle();
     }
 

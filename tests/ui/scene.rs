@@ -2,12 +2,10 @@
 
 use eframe::egui::Pos2;
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::action::Action;
 use touch2touch::app::command::WorkbenchCommand;
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::results;
-use touch2touch::app::settings::prefer;
-use touch2touch::app::settings::{LayerLook, SceneLayer};
+use touch2touch::app::settings::SceneLayer;
 use touch2touch::app::state::State;
 use touch2touch::app::workbench::Layer;
 use touch2touch_core::rig::lab;
@@ -62,23 +60,10 @@ fn the_list_of_what_is_drawn_switches_it_and_it_stays_so() {
     let legend = rig.harness.get_by_label("Legend").rect().center();
     rig.click_at(legend);
     let before = colors(&mut rig);
-    let at = rig.harness.get_by_label("Show membrane, surface, measured").rect().center();
+    let at = rig.harness.get_by_label("Show membrane, measured").rect().center();
     rig.click_at(at);
-    assert!(!state(&rig).settings.scene.layer(SceneLayer::Surface).shown);
+    assert!(!state(&rig).settings.scene.shows(SceneLayer::Membrane));
     assert!(colors(&mut rig).len() < before.len());
     rig.click_at(at);
-    assert!(state(&rig).settings.scene.layers.is_empty(), "as at first is not stored");
-    let surface = Action::MembraneSurface.command(state(&rig)).unwrap();
-    rig.send(surface);
-    let look = &state(&rig).settings.scene;
-    assert!(!look.layer(SceneLayer::Surface).shown && look.layer(SceneLayer::Membrane).shown, "points in its place");
-    assert!(colors(&mut rig).len() > 100);
-    rig.shoot("test-surface");
-    // Every row has its menu.
-    let dots = rig.harness.get_by_label("Look of contact points, measured").rect().center();
-    rig.click_at(dots);
-    rig.shoot("test-layer-menu");
-    let red = LayerLook { color: Some([250, 10, 10]), ..SceneLayer::Contact.preset() };
-    rig.send(prefer(move |s| s.scene.set(SceneLayer::Contact, red)));
-    assert!(colors(&mut rig).contains(&[250, 10, 10, 255]) || colors(&mut rig).len() > 100);
+    assert!(state(&rig).settings.scene.hidden.is_empty());
 }

@@ -7,8 +7,7 @@ use eframe::egui::{Event, ViewportCommand, ViewportEvent, ViewportId};
 use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::labels::{Question, Review};
 use touch2touch::app::library::Place;
-use touch2touch::app::services::Services as _;
-use touch2touch::app::services::live::LiveServices;
+use touch2touch::app::services::Services;
 use touch2touch::app::settings::Workspace;
 use touch2touch_pipeline::io::dataset::Dataset;
 use touch2touch_pipeline::io::masks::{FOLDER, MaskStore};
@@ -139,7 +138,7 @@ fn a_lost_graphics_device_closes_the_window_unasked_with_everything_kept() {
     assert_eq!(rig.question(), None);
     // All is on the disk although the process may die now.
     let dataset = Dataset::open(&rig.data).unwrap();
-    let settings = LiveServices::with_config_folder(Some(rig.config.clone())).load_settings().0;
+    let settings = Services::with_config_folder(Some(rig.config.clone())).load_settings().0;
     assert_eq!((settings.last.pair, settings.last.place), (pair, Some(Place::Path(rig.data.clone()))));
     std::fs::remove_file(rig.data.join(FOLDER)).unwrap();
     let labels = Labels::of(&dataset);

@@ -1,4 +1,4 @@
-//! The workbench by keys, clicks and drags: layers, poses by hand, measuring, reading points.
+//! The workbench by keys, clicks and drags: layers, poses by hand, reading points.
 
 use eframe::egui::{Key, Modifiers, Pos2, Vec2, vec2};
 use egui_kittest::kittest::Queryable as _;
@@ -183,45 +183,13 @@ fn icp_starts_where_the_hand_left_the_tool() {
     let hand = rig.hand();
     let run = hand.from_icp.expect("it came from a registration");
     assert_eq!(run.start.map(|s| s.get()), Some(from));
-    let report = &rig.model().results.runs.get(&run).unwrap().report;
+    let report = rig.model().results.runs.get(&run).unwrap().report();
     assert_eq!((report.start, report.runs.len()), (from, 1), "one start: this one");
     // It comes back to where the registration had been by itself.
     let off =
         PoseDifference::between(hand.pose, results::pose(rig.model(), MEASURED).ready().unwrap().grasp_from_object);
     assert!(off.angle_rad.to_degrees() < 1.0 && off.position_m < 1e-3, "{off:?}");
     assert!(hand.cost.unwrap().cost_m2 <= hand.began_cost.unwrap().cost_m2 * 1.05);
-}
-
-#[test]
-fn distances_and_angles_are_measured_from_point_to_point() {
-    let Some(mut rig) = Rig::aligned() else { return };
-    rig.press(Modifiers::NONE, Key::Y);
-    assert_eq!(rig.model().workbench.tool, SceneTool::Distance);
-    let cloud = results::cloud(rig.model(), MEASURED).ready().unwrap().contact_points();
-    let ends = [cloud[cloud.len() / 10], cloud[cloud.len() / 3]];
-    for p in ends {
-        let at = rig.harness.state().on_screen(MEASURED, p.to_array()).unwrap();
-        rig.click_at(at);
-    }
-    let marks = rig.model().workbench.marks.clone();
-    assert_eq!(marks.len(), 2);
-    // Another point may lie nearer to the eye under the same pixel; in the picture it is the same place.
-    for (mark, end) in marks.iter().zip(ends) {
-        let place = |p: [f64; 3]| rig.harness.state().on_screen(MEASURED, p).unwrap();
-        assert!((place(mark.1.to_array()) - place(end.to_array())).length() < 10.0);
-    }
-    rig.shoot("test-measure");
-    rig.press(Modifiers::NONE, Key::Escape);
-    assert!(rig.model().workbench.marks.is_empty());
-    rig.press(Modifiers::SHIFT, Key::Y);
-    for p in [ends[0], ends[1], cloud[cloud.len() / 2], ends[0]] {
-        let at = rig.harness.state().on_screen(MEASURED, p.to_array()).unwrap();
-        rig.click_at(at);
-    }
-    assert_eq!(rig.model().workbench.marks.len(), 1, "the fourth point begins anew");
-    // A click beside all points marks nothing and says why.
-    rig.click_at(rig.in_view([0.02, 0.5]));
-    assert_eq!(rig.model().workbench.marks.len(), 1);
 }
 
 #[test]

@@ -17,14 +17,6 @@ pub fn of_points(points: &[DVec3], object_from_points: &DAffine3, distance: &Mes
     points.par_iter().map(|p| distance.signed(object_from_points.transform_point3(*p)) as f32).collect()
 }
 
-/// Distances of points to the nearest point of another cloud, meters; NaN of a point that is not finite, and without one
-/// in the other cloud.
-pub fn to_cloud(points: &[DVec3], others: &[DVec3]) -> Vec<f32> {
-    let tree = Nearest::new(others);
-    let far = |p: &DVec3| tree.of(*p).filter(|_| p.is_finite()).map_or(f32::NAN, |(_, distance)| distance as f32);
-    points.par_iter().map(far).collect()
-}
-
 /// Finds the nearest of some points. Those that are not finite are left out.
 struct Nearest {
     points: Vec<[f64; 3]>,

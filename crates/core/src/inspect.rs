@@ -1,17 +1,10 @@
-//! Looking into a registration: what a step of the time machine compares.
+//! Looking into a registration: what a step compares.
 
 use glam::{DVec2, DVec3};
 
 use super::align::TraceStep;
 use super::align::correspond::{Matches, ModelPoints, Surface, correspondences};
-use super::frames::PlanarPose;
 use super::pose::{Registration, ToolModel};
-use super::units::angle_error;
-
-/// True where two poses are the same place: within a degree and a millimeter.
-pub fn is_same_place(a: PlanarPose, b: PlanarPose) -> bool {
-    angle_error(a.theta_rad, b.theta_rad) <= 1f64.to_radians() && (a.y_m - b.y_m).hypot(a.z_m - b.z_m) <= 1e-3
-}
 
 /// Model that contact points are compared with at any step of a run, prepared once per tool.
 #[derive(Clone, Debug)]
@@ -50,7 +43,9 @@ mod tests {
     use super::*;
     use crate::align::Ask;
     use crate::align::testing::{cross, cross_contacts};
+    use crate::frames::PlanarPose;
     use crate::pose::{Registration, register, register_with};
+    use crate::units::angle_error;
     use strum::IntoEnumIterator as _;
 
     const POSE: PlanarPose = PlanarPose { theta_rad: 0.1, y_m: 0.002, z_m: -0.001 };
@@ -58,6 +53,11 @@ mod tests {
     fn contacts(count: usize) -> Vec<DVec3> {
         let yz = cross_contacts(count, POSE, 2e-4, 1);
         yz.into_iter().enumerate().map(|(i, p)| DVec3::new(0.001 * (i % 3) as f64, p.x, p.y)).collect()
+    }
+
+    /// True where two poses are the same place: within a degree and a millimeter.
+    fn is_same_place(a: PlanarPose, b: PlanarPose) -> bool {
+        angle_error(a.theta_rad, b.theta_rad) <= 1f64.to_radians() && (a.y_m - b.y_m).hypot(a.z_m - b.z_m) <= 1e-3
     }
 
     #[test]

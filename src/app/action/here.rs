@@ -25,7 +25,7 @@ impl Action {
             Workspace::Align => self.group() == Group::Pose,
             Workspace::Label => self.group() == Group::Mask || self == Self::NextUnfinished,
             Workspace::Evaluate => {
-                matches!(self, Self::EvaluateDataset | Self::PredictAll | Self::ExportTable | Self::NextWorst)
+                matches!(self, Self::PredictAll | Self::ExportTable | Self::NextWorst)
             }
             Workspace::Adapt => {
                 matches!(self, Self::FitPairs | Self::UseFit | Self::TrainMasks | Self::StartTraining)
@@ -48,7 +48,7 @@ impl Action {
             Kind::Imprint(_) => {
                 picture || range || matches!(self, A::MaskVisible | A::MaskOutline | A::MaskFainter | A::MaskStronger)
             }
-            Kind::Versus => picture || range || matches!(self, A::CompareMode | A::SwapCompared),
+            Kind::Compare => picture || range || matches!(self, A::CompareMode | A::SwapCompared),
             Kind::Scene => picture || self.is_of_scene(),
             Kind::Steps => self.is_of_steps(),
         }
@@ -59,18 +59,16 @@ impl Action {
         use Action as A;
         let look = matches!(self, A::CameraLeft | A::CameraRight | A::CameraFront | A::CameraBack | A::CameraTop)
             || matches!(self, A::CameraBottom | A::CameraOblique | A::Distances | A::NextSides)
-            || matches!(self, A::WindowOnly | A::MembraneSurface | A::EyeDome | A::Parallel | A::CopyCamera)
-            || matches!(self, A::LinkCameras | A::NextLayer | A::BothClouds);
+            || matches!(self, A::WindowOnly | A::Parallel | A::NextLayer | A::BothClouds);
         look || self.is_nudge()
             || matches!(self, A::PoseTool | A::IcpFromHere | A::Accept | A::RevertHand)
-            || matches!(self, A::MeasureDistance | A::MeasureAngle | A::PlaySteps | A::PaintIn3d | A::PaintLayers)
+            || matches!(self, A::PlaySteps | A::PaintIn3d | A::PaintLayers)
     }
 
     /// True where it is about the steps of a registration.
     fn is_of_steps(self) -> bool {
         use Action as A;
-        matches!(self, A::StepBack | A::StepForward | A::FirstStep | A::LastStep | A::PlaySteps | A::PinStep)
-            || matches!(self, A::OwnStarts | A::Correspondences)
+        matches!(self, A::StepBack | A::StepForward | A::FirstStep | A::LastStep | A::PlaySteps | A::OwnStarts)
     }
 }
 
@@ -89,7 +87,7 @@ mod tests {
             assert!(Action::iter().any(|action| action.is_of_pane(pane)), "{pane:?}");
         }
         assert!(Action::Brush.is_of(Workspace::Label, None) && !Action::Brush.is_of(Workspace::Align, None));
-        assert!(Action::PinStep.is_of(Workspace::Inspect, Some(Pane::TimeMachine)));
-        assert!(!Action::PinStep.is_of(Workspace::Inspect, Some(Pane::Measured)));
+        assert!(Action::LastStep.is_of(Workspace::Inspect, Some(Pane::Steps)));
+        assert!(!Action::LastStep.is_of(Workspace::Inspect, Some(Pane::Measured)));
     }
 }

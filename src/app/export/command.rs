@@ -50,7 +50,7 @@ pub fn equivalent_words(state: &State, pane: Pane) -> Option<Vec<String>> {
     let words = match (pane, pane.kind()) {
         (Pane::Browser | Pane::Log, _) => verb("doctor"),
         (_, Kind::Scene) => posed(of_pair("export")?.option("--out", "exported"), state.workbench.side),
-        (Pane::TimeMachine, _) => {
+        (Pane::Steps, _) => {
             let start = state.inspect.start.map(|start| start_text(start.get()));
             posed(of_pair("pose")?, side).option_if("--start", start).word("--trace").word("--json")
         }
@@ -62,24 +62,21 @@ pub fn equivalent_words(state: &State, pane: Pane) -> Option<Vec<String>> {
             of_pair("generate")?.option("--finger", "both").option("--out", "predictions").then(drawn())
         }
         (Pane::Compare, _) => {
-            let versus = state.settings.compared();
+            let chosen = state.settings.compared();
             of_pair("compare")?
-                .option("--a", placed(state, &versus.a))
-                .option("--b", placed(state, &versus.b))
+                .option("--a", placed(state, &chosen.a))
+                .option("--b", placed(state, &chosen.b))
                 .then(recipe_shown(state, ImprintSource::Predicted).words(Stage::Pose))
         }
         (Pane::Masks, _) => of_pair("label")?,
-        (Pane::Results | Pane::Table, _) => {
+        (Pane::Results, _) => {
             let mut words = verb("evaluate");
             for (bundle, _) in results::evaluated(state).filter(|(_, chosen)| *chosen) {
                 words = words.option("--bundle", bundle.origin.path().display());
             }
             // Each bundle draws with its own choices.
             let recipe = Recipe { generator: None, ..recipe::in_force(state, ImprintSource::Predicted) };
-            words
-                .option_if("--grasps", state.table.grasps_per_tool)
-                .word_if(state.table.published, "--paper")
-                .then(recipe.words(Stage::Pose))
+            words.word_if(state.table.published, "--paper").then(recipe.words(Stage::Pose))
         }
         (Pane::Adapt, _) if state.learn.shown == Network::Generator => {
             let (setup, form) = (learn::adapt_setup(state)?, state.learn.form);
@@ -151,7 +148,7 @@ pub(super) fn recipe_shown(state: &State, imprint: ImprintSource) -> Recipe {
 
 /// The names of these pairs, as one word; `None` where there are none.
 fn names(state: &State, pairs: impl IntoIterator<Item = PairId>) -> Option<String> {
-    let all = &state.library.open.as_ref()?.source.index().pairs;
+    let all = &state.library.open.as_ref()?.source.dataset.index.pairs;
     let names: Vec<&str> = pairs.into_iter().filter_map(|id| Some(all.get(id.0 as usize)?.name.as_str())).collect();
     (!names.is_empty()).then(|| names.join(","))
 }

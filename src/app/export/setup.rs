@@ -3,20 +3,17 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::super::keys::{CloudKey, ImprintSource, MaskKey, MaskVersion, Registration};
+use super::super::keys::{ImprintSource, Registration};
 use super::super::results;
 use super::super::state::State;
 use super::super::state::export::StillAsked;
 use super::super::state::workbench::Layer;
 use super::command::recipe_shown;
-use touch2touch_core::contact::MaskBasis;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::rig::Rig;
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::export::pair_files::{PairParts, write};
 use touch2touch_pipeline::steps::estimate::Estimate;
-use touch2touch_pipeline::steps::mask::made_of;
-use touch2touch_pipeline::steps::pose::PoseResult;
 use touch2touch_pipeline::steps::prediction::predicted_by;
 use touch2touch_pipeline::steps::tool::NamedTool;
 use touch2touch_pipeline::still::StillSetup;
@@ -29,9 +26,9 @@ pub struct PairExport {
     prediction: Option<String>,
     rig: Arc<Rig>,
     estimate: Arc<Estimate>,
-    mask: String,
     registration: Registration,
-    pose: Option<Arc<PoseResult>>,
+    /// True where it has a pose.
+    posed: bool,
     truth: Option<PlanarPose>,
     tool: Option<Arc<NamedTool>>,
 }
@@ -48,9 +45,9 @@ impl PairExport {
             prediction: self.prediction.as_deref(),
             rig: &self.rig,
             clouds: self.estimate.surface(),
-            mask: &self.mask,
+            mask: &self.estimate.contact().made_of(),
             registration: self.registration,
-            pose: self.pose.as_deref(),
+            pose: if self.posed { self.estimate.pose().ok() } else { None },
             truth: self.truth,
             tool: self.tool.as_ref().map(|tool| (tool.name.as_str(), &tool.model)),
         };
@@ -74,23 +71,11 @@ pub(crate) fn still_setup(state: &State, asked: StillAsked) -> Option<StillSetup
     })
 }
 
-/// The sources of the contact masks of a cloud, as the verbs say them.
-fn masks_made_of(state: &State, cloud: &CloudKey) -> String {
-    let source = state.settings.mask.choice.source.key();
-    let keys = cloud.parts.iter().flatten().filter_map(|(imprint, version)| match version.as_ref()? {
-        MaskVersion::Hand(_) => Some(MaskBasis::Hand.key(source)),
-        MaskVersion::Auto(recipe) => {
-            let key = MaskKey { imprint: imprint.clone(), recipe: recipe.clone() };
-            Some(state.results.masks.get(&key)?.basis.key(recipe.source().key()))
-        }
-    });
-    made_of(keys.collect(), source)
-}
-
 /// The export of the selected pair; `None` while its cloud is not there.
 pub fn pair_export(state: &State, source: ImprintSource) -> Option<PairExport> {
     let cloud = results::cloud_key(state, source).ok()??;
-    let pose = results::pose_key(state, source).ok().flatten().and_then(|key| state.results.poses.get(&key)).cloned();
+    let posed = results::pose_key(state, source).ok().flatten();
+    let posed = posed.filter(|key| results::pose_of(state, key).is_some());
     let recipe =
         state.rig().pads().find_map(|pad| results::chosen(state, pad)).filter(|_| source == ImprintSource::Predicted);
     let prediction =
@@ -100,10 +85,9 @@ pub fn pair_export(state: &State, source: ImprintSource) -> Option<PairExport> {
         source,
         prediction,
         rig: state.rig(),
-        estimate: state.results.clouds.get(&cloud)?.clone(),
-        mask: masks_made_of(state, &cloud),
+        posed: posed.is_some(),
+        estimate: state.results.estimates.get(&posed.unwrap_or(cloud))?.clone(),
         registration: state.settings.registration,
-        pose,
         truth: results::sample(state).ready()?.grasp_from_object,
         tool: results::tool_key(state).ok().and_then(|key| state.results.tools.get(&key)).cloned(),
     })
@@ -111,6 +95,5 @@ pub fn pair_export(state: &State, source: ImprintSource) -> Option<PairExport> {
 
 /// True where the selected pair can be drawn in 3D.
 pub(crate) fn can_draw(state: &State) -> bool {
-    let open = state.library.open.as_ref();
-    open.is_some_and(|open| open.source.as_dataset().is_some()) && state.entry().is_some()
+    state.entry().is_some()
 }

@@ -1,7 +1,5 @@
 //! [`Inspection`]: a recorded registration, made ready to be looked through.
 
-use std::sync::Arc;
-
 use glam::DVec3;
 
 use super::super::keys::Registration;
@@ -15,7 +13,7 @@ use touch2touch_pipeline::steps::pose::PoseResult;
 #[derive(Clone, Debug)]
 pub struct Inspection {
     /// The recorded registration.
-    pub result: Arc<PoseResult>,
+    pub result: PoseResult,
     /// The contact points that were offered, meters, grasp frame.
     pub points: Vec<DVec3>,
     /// The counterparts that the points are compared with.
@@ -26,7 +24,7 @@ pub struct Inspection {
 
 impl Inspection {
     /// From a recorded registration, the contact points it was offered, and what they were compared with.
-    pub fn new(result: Arc<PoseResult>, points: Vec<DVec3>, tool: &ToolModel, registration: Registration) -> Self {
+    pub fn new(result: PoseResult, points: Vec<DVec3>, tool: &ToolModel, registration: Registration) -> Self {
         let report = &result.report;
         let mut runs: Vec<Vec<usize>> = vec![Vec::new(); report.runs.len()];
         for (i, step) in report.trace.iter().enumerate() {
@@ -69,11 +67,6 @@ impl Inspection {
         self.report().runs.get(run).map(|r| r.start)
     }
 
-    /// The pose it began at, `grasp_from_object`: not always the one asked for.
-    pub fn applied(&self, run: usize) -> Option<PlanarPose> {
-        self.steps(run).next().map(|s| s.grasp_from_object)
-    }
-
     /// The continuation after a step, in words: the reason to stop at the last one.
     pub fn what_next(&self, run: usize, at: usize) -> String {
         let (Some(here), last) = (self.step(run, at), self.num_steps(run).saturating_sub(1)) else {
@@ -93,6 +86,6 @@ impl Inspection {
 
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        self.points.len() * 24 + self.report().trace.len() * 8 + (100 << 10)
+        self.points.len() * 24 + self.result.bytes() + (100 << 10)
     }
 }

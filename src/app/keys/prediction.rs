@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::super::keys::TouchKey;
 use touch2touch_core::diffusion::GenerateConfig;
+use touch2touch_core::rig::PadId;
 use touch2touch_pipeline::infer::engine::EngineChoice;
 use touch2touch_pipeline::job::PreviewPicture;
 use touch2touch_pipeline::steps::prediction::Prediction;
@@ -27,6 +28,12 @@ impl PredictionKey {
     pub fn of(touch: TouchKey, recipe: &Recipe) -> Option<Self> {
         let (model, config) = recipe.generator.as_ref()?;
         Some(Self { touch, bundle: model.id.clone(), config: *config, runtime: recipe.engine })
+    }
+
+    /// The key of another finger of the pair.
+    #[must_use]
+    pub fn on(&self, finger: PadId) -> Self {
+        Self { touch: self.touch.pair.finger(finger), ..self.clone() }
     }
 
     /// The key that differs in its seed alone.

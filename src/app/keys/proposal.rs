@@ -1,6 +1,6 @@
 //! Keys of proposals.
 
-use super::super::keys::{Bits, ImprintKey, MaskKey, MaskRecipe, PoseKey, Revision};
+use super::super::keys::{Bits, EstimateKey, ImprintKey, MaskRecipe, Revision};
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::Grid;
 use touch2touch_core::label::CadPose;
@@ -11,7 +11,7 @@ pub enum CadPlace {
     /// At the true pose.
     Truth,
     /// At a registered one.
-    Registered(Box<PoseKey>),
+    Registered(Box<EstimateKey>),
     /// The place where a hand holds it: the bits of its numbers.
     Hand([u64; 3]),
 }
@@ -59,11 +59,4 @@ pub struct ProposalKey {
     pub imprint: ImprintKey,
     /// The inputs.
     pub of: ProposalInputs,
-}
-
-impl ProposalKey {
-    /// The automatic mask of the imprint by a recipe.
-    pub(crate) fn automatic(&self, recipe: &MaskRecipe) -> MaskKey {
-        MaskKey { imprint: self.imprint.clone(), recipe: recipe.clone() }
-    }
 }

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use super::super::effect::{Access, Effect, Errand};
-use super::super::source::DataSource;
+use super::super::effect::{Access, Effect, Task};
+use super::super::source::Source;
 use super::super::state::State;
 use super::super::state::tasks::{Level, TaskKind};
 use touch2touch_pipeline::error::TaskError;
@@ -12,19 +12,18 @@ use touch2touch_pipeline::job::JobCx;
 
 /// Takes masks over that lie in a form of other programs.
 pub struct ImportMasks {
-    pub(in crate::app) source: Arc<dyn DataSource>,
+    pub(in crate::app) source: Arc<Source>,
     pub(in crate::app) setup: ImportSetup,
 }
 
-impl Errand for ImportMasks {
+impl Task for ImportMasks {
     type End = Import;
     const KIND: TaskKind = TaskKind::Import;
 
     fn run(self, _: &Access, cx: &JobCx) -> Result<Import, TaskError> {
         let Self { source, mut setup } = self;
-        let dataset = source.on_disk(Self::KIND.name())?;
         setup.from = std::path::absolute(&setup.from).unwrap_or(setup.from);
-        import_masks(dataset, &setup, cx)
+        import_masks(&source.dataset, &setup, cx)
     }
 
     fn ended(import: &Import, state: &mut State, _: &mut Vec<Effect>) {

@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::super::effect::{Access, Effect, Errand};
+use super::super::effect::{Access, Effect, Task};
 use super::super::keys::{ImprintSource, ShiftMode};
-use super::super::source::DataSource;
+use super::super::source::Source;
 use super::super::state::State;
 use super::super::state::tasks::TaskKind;
 use super::super::{recipe, results, settings, tasks};
@@ -16,8 +16,6 @@ use touch2touch_pipeline::job::JobCx;
 use touch2touch_pipeline::pairs;
 use touch2touch_pipeline::scores::statistics::{PAIRS, StatisticsSetup, statistics};
 use touch2touch_pipeline::steps::bundles::BundleKind;
-use touch2touch_pipeline::steps::models::GenerateInput;
-use touch2touch_pipeline::steps::predict::Generating;
 use touch2touch_pipeline::steps::recipe::Recipe;
 
 /// The job on screen.
@@ -34,33 +32,30 @@ pub(super) fn start(state: &mut State, effects: &mut Vec<Effect>) {
     }
     let Some(source) = state.library.open.as_ref().map(|open| open.source.clone()) else { return };
     let recipe = recipe::in_force(state, ImprintSource::Predicted);
-    tasks::start(state, format!("{TITLE} of {}", source.title()), Refit { recipe, source }, effects);
+    tasks::start(state, format!("{TITLE} of {}", source.dataset.title), Refit { recipe, source }, effects);
 }
 
 /// Makes shift statistics of a data set.
 pub struct Refit {
     recipe: Recipe,
-    source: Arc<dyn DataSource>,
+    source: Arc<Source>,
 }
 
-impl Errand for Refit {
+impl Task for Refit {
     /// The statistics, and where they are kept.
     type End = (ShiftStatistics, Option<PathBuf>);
     const KIND: TaskKind = TaskKind::Refit;
 
     fn run(self, access: &Access, cx: &JobCx) -> Result<Self::End, TaskError> {
         let Self { recipe, source } = self;
-        let pairs = pairs::spread(source.index().pairs.len(), Some(PAIRS));
+        let pairs = pairs::spread(source.dataset.index.pairs.len(), Some(PAIRS));
         let setup = StatisticsSetup {
             pairs: pairs.map(|at| PairId(at as u32)).collect(),
-            fingers: source.rig().pad_list(),
+            fingers: source.dataset.rig.pad_list(),
             recipe,
-            dataset: source.title().to_owned(),
+            dataset: source.dataset.title.clone(),
         };
-        let predict = |by: Generating<'_>, inputs: &[GenerateInput<'_>], cx: &JobCx| {
-            access.services.predict(by.bundle, by.engine, by.config, inputs, cx)
-        };
-        let (found, _) = statistics(&setup, |pair| source.load(pair).map(Arc::new), predict, cx)?;
+        let (found, _) = statistics(&setup, |pair| source.load(pair).map(Arc::new), &access.services.models, cx)?;
         let saved = access.services.save_statistics(&found)?;
         Ok((found, saved))
     }

@@ -1,10 +1,12 @@
 //! Imprints: those measured lie in the sample, those predicted are made of a raw prediction.
 
-use super::super::jobs::{Job, Lane};
-use super::super::keys::{ColorKey, FlagsKey, ImprintSource, MetersKey, PictureKey, TouchKey};
+use std::sync::Arc;
+
+use super::super::jobs::{Job, Worker};
+use super::super::keys::{ColorKey, EstimateKey, FlagsKey, ImprintKey, ImprintSource, PictureKey, TouchKey};
 use super::super::pane::Demand;
 use super::super::results::{self, Computes, Demands, gone};
-use super::super::services::SharedServices;
+use super::super::services::Services;
 use super::super::state::{Absent, Lookup, State};
 use touch2touch_core::grid::{DepthMap, RgbGrid};
 use touch2touch_core::postprocess::Flag;
@@ -13,35 +15,22 @@ use touch2touch_pipeline::compare::{Beside, beside};
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::steps::imprint::{self, flags_of};
 
-impl Computes for MetersKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<DepthMap>> {
-        let Self(recipe, shift) = self;
-        let prediction = state.results.predictions.get(recipe)?.clone();
-        let sample = state.results.samples.get(&recipe.touch.pair)?.clone();
-        let (shift, finger) = (*shift, recipe.touch.finger);
-        Some(Job::new(Lane::Compute, "Prediction in meters", move |_| {
-            imprint::imprint_of(&prediction, shift, &sample, finger)
-        }))
-    }
-}
-
 impl Computes for ColorKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<RgbGrid>> {
+    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<RgbGrid>> {
         let prediction = state.results.predictions.get(&self.0)?.clone();
-        Some(Job::new(Lane::Compute, "Predicted color picture", move |_| {
+        Some(Job::new(Worker::Compute, "Predicted color picture", move |_| {
             imprint::color(&prediction, [0, 0])?.ok_or_else(gone)
         }))
     }
 }
 
 impl Computes for PictureKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Beside>> {
+    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Beside>> {
         let pair = self.0.pair;
         let source = state.library.open.as_ref()?.source.clone();
         let sample = state.results.samples.get(&pair)?.clone();
-        Some(Job::new(Lane::Files, "Stored picture", move |_| {
-            let dataset = source.as_dataset().ok_or_else(gone)?;
-            beside(dataset, pair.pair, &sample)?.ok_or_else(|| {
+        Some(Job::new(Worker::Files, "Stored picture", move |_| {
+            beside(&source.dataset, pair.pair, &sample)?.ok_or_else(|| {
                 let why = "no picture of another program's prediction lies beside this pair";
                 TaskError::new("Stored picture", why)
                     .with_hint("It is read from NAME_vqvae.png beside NAME_bubble.png.")
@@ -79,17 +68,17 @@ pub(crate) fn want_imprint(wants: &mut Demands<'_>, finger: PadId, touch: TouchK
     }
     match state.results.predictions.get(&recipe).map(|prediction| prediction.color.is_some()) {
         Some(true) => wants.ask(ColorKey(recipe)),
-        Some(false) => wants.ask(MetersKey(recipe, state.settings.shift)),
+        Some(false) => wants.ask(EstimateKey::imprint(&ImprintKey::Predicted(recipe, state.settings.shift))),
         None => {}
     }
 }
 
 impl Computes for FlagsKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Vec<Flag>>> {
+    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Vec<Flag>>> {
         let Self(recipe, shift) = self.clone();
         let prediction = state.results.predictions.get(&recipe)?.clone();
         let sample = state.results.samples.get(&recipe.touch.pair)?.clone();
-        Some(Job::new(Lane::Compute, "Depth chain", move |_| {
+        Some(Job::new(Worker::Compute, "Depth chain", move |_| {
             flags_of(&prediction, shift, &sample, recipe.touch.finger)
         }))
     }

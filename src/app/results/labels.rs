@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use super::super::jobs::{Job, Lane};
+use super::super::jobs::{Job, Worker};
 use super::super::keys::LabelsKey;
 use super::super::keys::dataset::Read;
 use super::super::results::Computes;
-use super::super::services::SharedServices;
+use super::super::services::Services;
 use super::super::state::State;
 use super::super::state::labels::Stored;
 use super::super::state::tasks::Level;
@@ -18,11 +18,11 @@ fn name(state: &State, key: &LabelsKey) -> Option<String> {
 }
 
 impl Computes for LabelsKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Read>> {
+    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Read>> {
         let (source, name) = (state.library.open.as_ref()?.source.clone(), name(state, self)?);
-        Some(Job::new(Lane::Files, format!("Labels of {name}"), move |_| {
-            let labels = source.load_labels(&name)?;
-            let told = source.past(&name, &labels);
+        Some(Job::new(Worker::Files, format!("Labels of {name}"), move |_| {
+            let labels = source.labels.load(&name)?;
+            let told = source.labels.past(&name, &labels);
             Ok(Read { labels, told })
         }))
     }

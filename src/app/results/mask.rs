@@ -4,72 +4,15 @@ use std::sync::Arc;
 
 use strum::IntoEnumIterator as _;
 
-use super::super::jobs::{Job, Lane};
-use super::super::keys::{ImprintKey, ImprintSource, MaskKey, MaskRecipe, MaskVersion, ToolKey};
-use super::super::results::{Computes, Demands, gone};
-use super::super::services::SharedServices;
-use super::super::state::results::Request;
-use super::super::state::tasks::Level;
+use super::super::keys::{EstimateKey, ImprintKey, ImprintSource, MaskRecipe, MaskVersion};
+use super::super::results::Demands;
 use super::super::state::{Absent, Lookup, State};
 use super::super::{recipe, results};
-use touch2touch_core::contact::{ContactMask, MaskBasis};
-use touch2touch_core::grid::{DepthMap, Mask};
+use touch2touch_core::contact::MaskBasis;
+use touch2touch_core::grid::Mask;
 use touch2touch_core::label::Provenance;
 use touch2touch_core::rig::PadId;
 use touch2touch_pipeline::labels::{DrawnMask, MaskPlace};
-use touch2touch_pipeline::steps::mask::{MaskInputs, contact_mask};
-
-/// A mask of an imprint; `None` if it is not there.
-pub(crate) fn mask_of(state: &State, version: &MaskVersion, imprint: &ImprintKey) -> Option<ContactMask> {
-    match version {
-        MaskVersion::Auto(recipe) => {
-            let key = MaskKey { imprint: imprint.clone(), recipe: recipe.clone() };
-            Some((**state.results.masks.get(&key)?).clone())
-        }
-        MaskVersion::Hand(revision) => {
-            let hand = drawn_mask_on(state, imprint).filter(|hand| hand.revision == *revision)?;
-            Some(ContactMask { mask: hand.mask.clone(), basis: MaskBasis::Hand, unsure: None })
-        }
-    }
-}
-
-impl Computes for MaskKey {
-    fn job(&self, state: &State, services: &SharedServices) -> Option<Job<ContactMask>> {
-        let imprint = results::imprint_of(state, &self.imprint).ready()?.clone();
-        let touch = self.imprint.touch();
-        let sample = state.results.samples.get(&touch.pair)?.clone();
-        let tool = state.library.entry(touch.pair.pair).and_then(|entry| entry.tool.as_deref());
-        let tool = tool.map(|tool| ToolKey { dataset: touch.pair.dataset, name: tool.into() });
-        let tool = tool.and_then(|key| state.results.tools.get(&key).cloned());
-        let (lane, what, model) = match &self.recipe {
-            MaskRecipe::Unet(id, _) => {
-                (Lane::Models, "Contact mask by the mask model", Some(state.library.bundle(id)?.clone()))
-            }
-            _ => (Lane::Compute, "Contact mask", None),
-        };
-        let (services, engine, recipe) = (services.clone(), state.settings.runtime, self.recipe.clone());
-        Some(Job::new(lane, what, move |_| {
-            let tool = tool.as_deref().map(|tool| &tool.model);
-            let inputs = MaskInputs { sample: &sample, tool, labels: None, of: None };
-            let by_model = |imprint: &DepthMap| {
-                let bundle = model.as_ref().ok_or_else(gone)?;
-                services.mask_by_model(bundle, engine, imprint, recipe.probability())
-            };
-            contact_mask(&recipe, &imprint, touch.finger, inputs, by_model)
-        }))
-    }
-
-    /// The log says once what a mask is made of where that is not what its recipe names.
-    fn arrived(&self, state: &mut State, found: &Arc<ContactMask>) {
-        let Some(why) = found.basis.note() else { return };
-        let touch = self.imprint.touch();
-        let first = state.results.noted.insert(Request::Mask(self.clone()));
-        if let Some(entry) = state.library.entry(touch.pair.pair).filter(|_| first && state.is_selected(touch.pair)) {
-            let text = format!("{}, {} finger: {why}", entry.name, state.finger_name(touch.finger));
-            state.log.push(Level::Warning, text, None, None);
-        }
-    }
-}
 
 /// The mask in force.
 #[derive(Clone, Debug)]
@@ -109,17 +52,29 @@ pub(crate) fn mask_recipe(state: &State, finger: PadId) -> Result<MaskRecipe, Ab
     Ok(recipe)
 }
 
-/// The recipe of the automatic mask of one finger's imprint.
-fn mask_key(state: &State, source: ImprintSource, finger: PadId) -> Result<MaskKey, Absent> {
-    Ok(MaskKey { imprint: results::imprint_key(state, source, finger)?, recipe: mask_recipe(state, finger)? })
-}
-
 /// The automatic mask of one finger's imprint.
 pub(crate) fn automatic_mask(state: &State, source: ImprintSource, finger: PadId) -> Lookup<'_, Arc<Mask>> {
     if results::imprint(state, source, finger).ready().is_none() {
         return results::imprint(state, source, finger).without();
     }
-    state.look_or(mask_key(state, source, finger).map(Some), || None).map(|found| &found.mask)
+    let key = results::imprint_key(state, source, finger).and_then(|imprint| automatic(state, &imprint, finger));
+    let found = state.look_or(key.map(Some), || None);
+    found.and_then(Absent::NoContact, |made| Some(&made.contact().masks[finger].as_ref()?.mask))
+}
+
+/// The key of the automatic mask of an imprint.
+fn automatic(state: &State, imprint: &ImprintKey, finger: PadId) -> Result<EstimateKey, Absent> {
+    Ok(EstimateKey::mask(imprint, MaskVersion::Auto(mask_recipe(state, finger)?)))
+}
+
+/// The mask of an imprint: the drawn one, else the automatic one; `None` where none can be made.
+pub(crate) fn mask_version(state: &State, imprint: &ImprintKey, finger: PadId) -> Option<MaskVersion> {
+    if let Some(hand) = drawn_mask_on(state, imprint) {
+        return Some(MaskVersion::Hand(hand.revision));
+    }
+    let key = automatic(state, imprint, finger).ok()?;
+    let (_, mask) = key.parts[finger].clone()?;
+    mask.filter(|_| state.failure(key).is_none())
 }
 
 /// The place of a mask that is drawn on one finger's imprint; `None` while there is no such imprint.
@@ -178,9 +133,17 @@ pub(crate) fn automatic_provenance(
     finger: PadId,
     recipe: &MaskRecipe,
 ) -> Provenance {
-    let key = results::imprint_key(state, source, finger).map(|imprint| MaskKey { imprint, recipe: recipe.clone() });
-    let found = key.ok().and_then(|key| state.results.masks.get(&key));
+    let key = results::imprint_key(state, source, finger).ok();
+    let key = key.map(|imprint| EstimateKey::mask(&imprint, MaskVersion::Auto(recipe.clone())));
+    let made = key.and_then(|key| state.results.estimates.get(&key));
+    let found = made.and_then(|made| made.contact().masks[finger].as_ref());
     recipe.provenance(state.library.mask_model(recipe), found.map_or(MaskBasis::Source, |found| found.basis))
+}
+
+/// True where automatic masks take the CAD model, which is still being read.
+pub(crate) fn awaits_tool(state: &State) -> bool {
+    let cad = matches!(recipe::automatic_mask(state), Ok(MaskRecipe::Cad(_)));
+    cad && matches!(results::tool(state), Lookup::Waiting)
 }
 
 pub(crate) fn want_mask(wants: &mut Demands<'_>, source: ImprintSource, finger: PadId) {
@@ -192,9 +155,10 @@ pub(crate) fn want_mask(wants: &mut Demands<'_>, source: ImprintSource, finger: 
     {
         return;
     }
-    let Ok(key) = mask_key(state, source, finger) else { return };
-    if matches!(key.recipe, MaskRecipe::Cad(_)) && results::tool(state).ready().is_none() {
-        return results::want_tool(wants);
+    let key = results::imprint_key(state, source, finger).and_then(|imprint| automatic(state, &imprint, finger));
+    match key {
+        Ok(_) if awaits_tool(state) => results::want_tool(wants),
+        Ok(key) => wants.ask(key),
+        Err(_) => {}
     }
-    wants.ask(key);
 }

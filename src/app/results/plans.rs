@@ -1,25 +1,30 @@
 //! Results about the whole data set: plans of exports, imports and trainings of masks, and the doctor's lines.
 
-use super::super::jobs::{Job, Lane};
+use std::sync::Arc;
+
+use super::super::jobs::{Job, Worker};
 use super::super::keys::{AboutKey, ImportPlanKey, MaskPlanKey, Revision, TrainPlanKey};
 use super::super::pane::Demand;
 use super::super::results::{Computes, Demands};
-use super::super::services::SharedServices;
+use super::super::services::Services;
 use super::super::state::State;
 use super::super::state::learn::Network;
 use super::super::state::tasks::TaskKind;
 use touch2touch_pipeline::doctor::{Fact, facts};
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::export::import::{Import, ImportSetup, plan_import};
-use touch2touch_pipeline::export::{DrawnMasks, Plan};
+use touch2touch_pipeline::export::{DrawnMasks, ExportSetup, Plan, plan as plan_export};
 use touch2touch_pipeline::labels::Labels;
 use touch2touch_pipeline::learn::train::{TrainPlan, plan};
 
 impl Computes for MaskPlanKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Plan>> {
+    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Plan>> {
         let source = state.library.open.as_ref()?.source.clone();
         let (changed, choice) = (state.document.finished_labels(), self.choice);
-        Some(Job::new(Lane::Files, "Plan of an export", move |_| source.plan_masks(&changed, choice)))
+        Some(Job::new(Worker::Files, "Plan of an export", move |_| {
+            let masks = DrawnMasks { labels: &Labels::of(&source.dataset), changed: &changed };
+            plan_export(&source.dataset, &masks, &ExportSetup { pairs: None, choice })
+        }))
     }
 
     /// The form says it.
@@ -42,12 +47,10 @@ pub(crate) fn want_mask_plan(wants: &mut Demands<'_>) {
 }
 
 impl Computes for ImportPlanKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Import>> {
+    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Import>> {
         let source = state.library.open.as_ref()?.source.clone();
         let setup = import_setup(state)?;
-        Some(Job::new(Lane::Files, "Plan of an import", move |cx| {
-            plan_import(source.on_disk("Plan of an import")?, &setup, cx)
-        }))
+        Some(Job::new(Worker::Files, "Plan of an import", move |cx| plan_import(&source.dataset, &setup, cx)))
     }
 
     /// The form says it.
@@ -78,12 +81,11 @@ pub(crate) fn import_setup(state: &State) -> Option<ImportSetup> {
 }
 
 impl Computes for TrainPlanKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<TrainPlan>> {
+    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<TrainPlan>> {
         let source = state.library.open.as_ref()?.source.clone();
         let (changed, choice) = (state.document.labels.clone(), self.choice);
-        Some(Job::new(Lane::Files, "Plan of a training", move |_| {
-            let dataset = source.on_disk("Plan of a training")?;
-            plan(dataset, &DrawnMasks { labels: &Labels::of(dataset), changed: &changed }, choice)
+        Some(Job::new(Worker::Files, "Plan of a training", move |_| {
+            plan(&source.dataset, &DrawnMasks { labels: &Labels::of(&source.dataset), changed: &changed }, choice)
         }))
     }
 
@@ -115,12 +117,11 @@ pub(crate) fn want_train_plan(wants: &mut Demands<'_>) {
 }
 
 impl Computes for AboutKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Vec<Fact>>> {
+    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Vec<Fact>>> {
         let source = state.library.open.as_ref()?.source.clone();
         let changed = state.document.labels.clone();
-        Some(Job::new(Lane::Compute, "About this data", move |_| {
-            let dataset = source.on_disk("About this data")?;
-            Ok(facts(dataset, &DrawnMasks { labels: &Labels::of(dataset), changed: &changed }))
+        Some(Job::new(Worker::Compute, "About this data", move |_| {
+            Ok(facts(&source.dataset, &DrawnMasks { labels: &Labels::of(&source.dataset), changed: &changed }))
         }))
     }
 }

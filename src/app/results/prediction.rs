@@ -1,48 +1,64 @@
 //! Raw predictions: those kept on the disk, those that a pane needs, and those of the pair on screen that cost little.
 
-use std::borrow::Cow;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use super::super::jobs::{Job, Lane};
-use super::super::keys::{ImprintSource, Keyed, PredictionKey, PrefetchKey, StoredKey, TouchKey};
+use super::super::jobs::{Job, Worker};
+use super::super::keys::{ImprintSource, Keyed, PredictionKey, StoredKey, TouchKey};
 use super::super::pane::Demand;
 use super::super::recipe;
 use super::super::results::preview::Onlooker;
 use super::super::results::{self, Computes, Demands};
-use super::super::services::{Services, SharedServices};
-use super::super::source::DataSource;
+use super::super::services::Services;
+use super::super::source::Source;
 use super::super::state::results::Key as _;
 use super::super::state::{Absent, State};
-use touch2touch_core::grid::RgbGrid;
 use touch2touch_core::rig::{PadId, SensorId};
 use touch2touch_core::sample::Sample;
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::job::JobCx;
 use touch2touch_pipeline::steps::bundles::{BundleInfo, BundleKind};
-use touch2touch_pipeline::steps::models;
+use touch2touch_pipeline::steps::models::KeptPrediction;
+use touch2touch_pipeline::steps::predict::Generating;
 use touch2touch_pipeline::steps::prediction::Prediction;
 
+/// The time between two looks whether a pair is still on screen, before its prediction begins.
+const LOOK: Duration = Duration::from_millis(10);
+
 impl Computes for PredictionKey {
-    fn job(&self, state: &State, services: &SharedServices) -> Option<Job<Prediction>> {
+    fn job(&self, state: &State, services: &Arc<Services>) -> Option<Job<Prediction>> {
         let (services, recipe) = (services.clone(), self.clone());
         let source = state.library.open.as_ref()?.source.clone();
         let bundle = state.library.bundle(&recipe.bundle)?.clone();
         let sample = state.results.samples.get(&recipe.touch.pair).cloned();
-        Some(Job::new(Lane::Models, format!("Generate with {}", bundle.name), move |cx| {
-            let made = generate(&*services, vec![recipe], &bundle, &*source, sample, cx, None)?.pop();
-            made.map(|(_, made)| Arc::unwrap_or_clone(made)).ok_or_else(|| TaskError::new("Generate", "no answer"))
+        // Who pages on does not want it. Once for a pair and settings: the other finger follows at once.
+        let beside = |pad| state.results.predictions.contains(&self.on(pad));
+        let patience = if state.rig().pads().any(beside) { Duration::ZERO } else { services.patience };
+        let what = format!("Generate with {}", bundle.name);
+        Some(Job::new(Worker::Models, what.clone(), move |cx| {
+            let begin = Instant::now();
+            while begin.elapsed() < patience {
+                cx.check(&what)?;
+                std::thread::sleep(LOOK);
+            }
+            cx.check(&what)?;
+            let made = generate(&services, vec![recipe], &bundle, &source, sample, cx, None)?.pop();
+            made.map(|(_, made)| Arc::unwrap_or_clone(made)).ok_or_else(|| TaskError::new(what, "no answer"))
         }))
     }
 
+    /// One that is only compared with something does not push away what is looked at.
     fn arrived(&self, state: &mut State, _: &Arc<Prediction>) {
-        state.results.list_made(self, true);
+        let named = recipe::prediction(state, self.touch).as_ref() == Some(self);
+        let beside = |pad| results::shown(state, self.touch.pair.finger(pad)) == Some(&self.on(pad));
+        let in_front = named || state.rig().pads().filter(|pad| *pad != self.touch.finger).any(beside);
+        state.results.list_made(self, in_front);
     }
 }
 
 impl Computes for StoredKey {
-    fn job(&self, state: &State, services: &SharedServices) -> Option<Job<Keyed>> {
+    fn job(&self, state: &State, services: &Arc<Services>) -> Option<Job<Keyed>> {
         let (services, touch) = (services.clone(), self.0);
         let bundles = state.library.bundles.clone();
         let runtime = state.settings.runtime;
@@ -50,10 +66,15 @@ impl Computes for StoredKey {
         // Only sensors that some bundle starts from.
         let starts = bundles.iter().filter_map(|bundle| bundle.ends(&sample.rig)?.ok()).map(|ends| ends.input);
         let inputs: BTreeSet<SensorId> = starts.collect();
-        Some(Job::new(Lane::Files, "Look for earlier predictions", move |_| {
+        Some(Job::new(Worker::Files, "Look for earlier predictions", move |_| {
             let pictures = inputs.iter().filter_map(|input| sample.pad(touch.finger)?.picture(*input));
-            let found = pictures.flat_map(|picture| services.stored(&bundles, runtime, touch, &picture));
-            Ok(found.map(|(key, made)| (key, Arc::new(made))).collect())
+            let kept = pictures.flat_map(|picture| services.models.kept(&bundles, runtime, &picture));
+            let keyed = |kept: KeptPrediction| {
+                let bundle = kept.prediction.bundle.clone();
+                let key = PredictionKey { touch, bundle, config: kept.config, runtime: kept.engine };
+                (key, Arc::new(kept.prediction))
+            };
+            Ok(kept.map(keyed).collect())
         }))
     }
 
@@ -69,58 +90,39 @@ impl Computes for StoredKey {
     }
 }
 
-/// Makes `recipes`, all of one pair and bundle. A finger without a GelSlim image is left out where another has one.
-/// `sample` is the pair, if it is loaded; `onlooker` sees pictures on the way.
+/// Makes predictions of fingers of one pair that differ in nothing else. A finger without a picture to start from is left out
+/// where another has one. `sample` is the pair, if it is loaded; `onlooker` sees pictures on the way.
 ///
 /// # Errors
-/// If no finger has a GelSlim image, the pair or the model cannot be loaded or run, or the job was told to stop.
+/// If no finger has such a picture, the pair or the model cannot be loaded or run, or the job was told to stop.
 pub(crate) fn generate(
-    services: &dyn Services,
-    recipes: Vec<PredictionKey>,
+    services: &Services,
+    mut keys: Vec<PredictionKey>,
     bundle: &BundleInfo,
-    source: &dyn DataSource,
+    source: &Source,
     sample: Option<Arc<Sample>>,
     cx: &JobCx,
     onlooker: Option<Onlooker>,
 ) -> Result<Keyed, TaskError> {
-    let Some(first) = recipes.first() else { return Ok(Vec::new()) };
-    let rig = source.rig();
-    let ends = bundle.ends(&rig).transpose().map_err(|err| TaskError::from_error("Generate", &err))?;
-    let input = ends.ok_or_else(|| TaskError::new("Generate", "the bundle is not a generator"))?.input;
-    let sensor = rig.sensor(input).map_or("input", |sensor| &*sensor.name).to_owned();
-    let fingers: Vec<_> = recipes.iter().map(|recipe| rig.pad_key(recipe.touch.finger)).collect();
-    let missing = format!("there is no {sensor} image of the {} finger", fingers.join(" or "));
+    let Some(PredictionKey { touch, config, runtime, .. }) = keys.first().cloned() else { return Ok(Vec::new()) };
+    let generating = Generating { bundle, engine: runtime, config: &config };
+    generating.input(&source.dataset.rig)?;
     let sample = match sample {
         Some(sample) => sample,
-        None => Arc::new(source.load(first.touch.pair.pair)?),
+        None => Arc::new(source.load(touch.pair.pair)?),
     };
-    let (engine, config) = (first.runtime, first.config);
-    let touched = |recipe: PredictionKey| {
-        let touch = sample.pad(recipe.touch.finger)?;
-        let size = touch.depth().map_or([0, 0], |bubble| bubble.imprint.size());
-        Some((recipe, (touch.picture(input)?, size)))
-    };
-    // One picture for each finger, whatever the number of predictions: it is encoded once.
-    let mut pictures: BTreeMap<PadId, (Cow<'_, RgbGrid>, [usize; 2])> = BTreeMap::new();
-    let mut keys: Vec<PredictionKey> = Vec::new();
-    for (key, found) in recipes.into_iter().filter_map(touched) {
-        pictures.entry(key.touch.finger).or_insert(found);
-        keys.push(key);
-    }
-    let wanted = |key: &PredictionKey| {
-        let (picture, size) = &pictures[&key.touch.finger];
-        models::GenerateInput { difference: picture, seed: key.config.seed, size: *size }
-    };
-    let wanted: Vec<models::GenerateInput<'_>> = keys.iter().map(wanted).collect();
+    keys.retain(|key| generating.picture(&sample, key.touch.finger).is_ok_and(|picture| picture.is_some()));
     if keys.is_empty() {
-        return Err(TaskError::new("Generate", missing));
+        return Err(generating.no_input(&sample.rig));
     }
     let cx = match onlooker {
         Some(onlooker) => cx.clone().with_previews(onlooker.of(keys.clone())),
         None => cx.clone(),
     };
-    let made = services.predict(bundle, engine, &config, &wanted, &cx)?;
-    Ok(keys.into_iter().zip(made.into_iter().map(Arc::new)).collect())
+    let pads: Vec<PadId> = keys.iter().map(|key| key.touch.finger).collect();
+    let mut made = generating.pads(&services.models, &sample, &pads, &cx)?;
+    let keyed = |key: PredictionKey| made[key.touch.finger].take().map(|made| (key, Arc::new(made)));
+    Ok(keys.into_iter().filter_map(keyed).collect())
 }
 
 /// Asks for the predictions of a touch that were made before this start of the program.
@@ -137,7 +139,7 @@ pub(crate) fn want_other_finger(wants: &mut Demands<'_>, finger: PadId) {
     let made = state.rig().pads().filter(|pad| *pad != finger).find_map(|pad| results::chosen(state, pad));
     let (Some(touch), Some(made)) = (state.touch_key(finger), made) else { return };
     let looked_up = state.results.looked_up.contains(&touch);
-    let recipe = PredictionKey { touch, ..made.clone() };
+    let recipe = made.on(finger);
     if !state.settings.generate.both_fingers || !looked_up || state.results.predictions.contains(&recipe) {
         return;
     }
@@ -185,37 +187,8 @@ pub(crate) fn can_start(state: &State, finger: PadId) -> bool {
 
 /// The highest cost of a prediction that is made without being asked for, seconds.
 pub(crate) const CHEAP_S: f64 = 1.0;
-/// The time between two looks whether the pair is still on screen, before its prediction begins.
-const LOOK: Duration = Duration::from_millis(10);
-
-impl Computes for PrefetchKey {
-    fn job(&self, state: &State, services: &SharedServices) -> Option<Job<Prediction>> {
-        let Job { lane, what, body } = self.0.job(state, services)?;
-        // Once for a pair and settings: the other finger follows at once.
-        let beside = |pad| PredictionKey { touch: self.0.touch.pair.finger(pad), ..self.0.clone() };
-        let first = !state.rig().pads().any(|pad| state.results.predictions.contains(&beside(pad)));
-        let patience = if first { services.patience() } else { Duration::ZERO };
-        let told = what.clone();
-        Some(Job::new(lane, what, move |cx| {
-            // Who pages on does not want it.
-            let mut waited = Duration::ZERO;
-            while waited < patience {
-                cx.check(&told)?;
-                std::thread::sleep(LOOK);
-                waited += LOOK;
-            }
-            cx.check(&told)?;
-            body(cx)
-        }))
-    }
-
-    fn arrived(&self, state: &mut State, made: &Arc<Prediction>) {
-        results::keep_prediction(state, self.0.clone(), made.clone(), true);
-    }
-}
-
 /// The prediction of a finger of the pair on screen that is made without being asked for, if one is.
-pub(crate) fn prefetch(state: &State, finger: PadId) -> Option<PrefetchKey> {
+pub(crate) fn prefetch(state: &State, finger: PadId) -> Option<PredictionKey> {
     let needs = [Demand::Imprint(ImprintSource::Predicted), Demand::Comparison];
     let (_, cloud) = results::shows_cloud(state, ImprintSource::Predicted);
     let shown = cloud || needs.into_iter().any(|need| state.needs(need));
@@ -227,13 +200,13 @@ pub(crate) fn prefetch(state: &State, finger: PadId) -> Option<PrefetchKey> {
         return None;
     }
     let touch = state.touch_key(finger).filter(|touch| state.results.looked_up.contains(touch))?;
-    let key = PrefetchKey(recipe::prediction(state, touch)?);
+    let key = recipe::prediction(state, touch)?;
     // What a person picked under these settings is meant.
-    let there = state.results.predictions.contains(&key.0) || results::picked(state, touch).is_some();
+    let there = state.results.predictions.contains(&key) || results::picked(state, touch).is_some();
     if there || !results::can_start(state, finger) {
         return None;
     }
-    let cheap = state.results.cost_of(&key.0).is_none_or(|seconds| seconds < CHEAP_S);
+    let cheap = state.results.cost_of(&key).is_none_or(|seconds| seconds < CHEAP_S);
     (cheap && state.failure(key.clone()).is_none()).then_some(key)
 }
 
@@ -241,6 +214,6 @@ pub(crate) fn prefetch(state: &State, finger: PadId) -> Option<PrefetchKey> {
 pub(crate) fn want_predictions_ahead(wants: &mut Demands<'_>) {
     let fingers = results::fingers_to_generate(wants.state);
     for key in fingers.into_iter().filter_map(|finger| prefetch(wants.state, finger)) {
-        wants.ask_unless(false, key);
+        wants.ask(key);
     }
 }

@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
-use super::super::jobs::{Job, Lane};
+use super::super::jobs::{Job, Worker};
 use super::super::keys::{
-    CadPlace, Distances, DistancesKey, ImprintSource, PairKey, ProposalInputs, ProposalKey, ToolKey,
+    CadPlace, Distances, DistancesKey, EstimateKey, ImprintSource, MaskRecipe, MaskVersion, PairKey, ProposalInputs,
+    ProposalKey, ToolKey,
 };
 use super::super::results;
 use super::super::results::{Computes, Demands};
-use super::super::services::SharedServices;
+use super::super::services::Services;
 use super::super::state::{Absent, Lookup, State};
 use touch2touch_core::bits::Bits;
 use touch2touch_core::frames::PlanarPose;
@@ -25,7 +26,7 @@ fn cad_pose(state: &State, place: &CadPlace, pair: PairKey) -> Option<(CadPose, 
     Some(match place {
         CadPlace::Truth => (CadPose::Truth, state.results.samples.get(&pair)?.grasp_from_object?),
         CadPlace::Registered(key) => {
-            let pose = state.results.poses.get(key)?.grasp_from_object;
+            let pose = results::pose_of(state, key)?.grasp_from_object;
             (CadPose::Registered(pose), pose)
         }
         CadPlace::Hand(bits) => {
@@ -37,14 +38,14 @@ fn cad_pose(state: &State, place: &CadPlace, pair: PairKey) -> Option<(CadPose, 
 }
 
 impl Computes for DistancesKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Distances>> {
+    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Distances>> {
         let (imprint, touch) = (results::imprint_of(state, &self.imprint).ready()?.clone(), self.imprint.touch());
         let (at, pose) = cad_pose(state, &self.at, touch.pair)?;
         let (sample, side) = (state.results.samples.get(&touch.pair)?.clone(), self.imprint.side());
         let tool = state.library.entry(touch.pair.pair)?.tool.as_deref()?;
         let tool = ToolKey { dataset: touch.pair.dataset, name: tool.into() };
         let tool = state.results.tools.get(&tool)?.clone();
-        Some(Job::new(Lane::Compute, "Distances to the CAD model", move |_| {
+        Some(Job::new(Worker::Compute, "Distances to the CAD model", move |_| {
             let on = OnPad { sample: &sample, pad: touch.finger };
             let grid = propose::cad_distances(&imprint, side, on, &tool.model, pose)?;
             Ok(Distances { grid, at })
@@ -53,17 +54,18 @@ impl Computes for DistancesKey {
 }
 
 impl Computes for ProposalKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Proposal>> {
+    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Proposal>> {
         let imprint = results::imprint_of(state, &self.imprint).ready()?.clone();
         let job = |make: Box<dyn FnOnce() -> Result<Proposal, TaskError> + Send>| {
-            Some(Job::new(Lane::Compute, WHAT, move |_| make()))
+            Some(Job::new(Worker::Compute, WHAT, move |_| make()))
         };
         match &self.of {
             ProposalInputs::Automatic(recipe) => {
-                let found = state.results.masks.get(&self.automatic(recipe))?.clone();
+                let made = state.results.estimates.get(&automatic(self, recipe))?;
+                let found = made.contact().masks[self.imprint.touch().finger].clone()?;
                 let model = state.library.mask_model(recipe).to_owned();
                 let recipe = recipe.clone();
-                job(Box::new(move || Ok(propose::automatic((*found).clone(), &recipe, &model))))
+                job(Box::new(move || Ok(propose::automatic(found, &recipe, &model))))
             }
             ProposalInputs::Cad(at, within) => {
                 let key = DistancesKey { imprint: self.imprint.clone(), at: at.clone() };
@@ -76,6 +78,11 @@ impl Computes for ProposalKey {
             }
         }
     }
+}
+
+/// The automatic mask that is proposed.
+fn automatic(key: &ProposalKey, recipe: &MaskRecipe) -> EstimateKey {
+    EstimateKey::mask(&key.imprint, MaskVersion::Auto(recipe.clone()))
 }
 
 /// The recipe of the proposal for one finger's imprint; `Ok(None)` while something that it takes is not there yet.
@@ -146,8 +153,8 @@ pub(crate) fn want_proposal(wants: &mut Demands<'_>) {
     }
     let Ok(Some(key)) = proposal_key(state, source, finger) else { return };
     match &key.of {
-        ProposalInputs::Automatic(recipe) if !state.results.masks.contains(&key.automatic(recipe)) => {
-            return wants.ask(key.automatic(recipe));
+        ProposalInputs::Automatic(recipe) if !state.results.estimates.contains(&automatic(&key, recipe)) => {
+            return wants.ask(automatic(&key, recipe));
         }
         ProposalInputs::Cad(at, _) => {
             let distances = DistancesKey { imprint: key.imprint.clone(), at: at.clone() };

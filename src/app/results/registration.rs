@@ -4,13 +4,11 @@ use std::sync::Arc;
 
 use strum::IntoEnumIterator as _;
 
-use super::super::jobs::{Job, Lane};
-use super::super::keys::{
-    DeviationKey, ImprintSource, Inspection, InspectionKey, LayersKey, PoseBits, RankingKey, RunKey, ToolKey,
-};
+use super::super::jobs::{Job, Worker};
+use super::super::keys::{DeviationKey, ImprintSource, Inspection, LayersKey, PoseBits, RankingKey, RunKey, ToolKey};
 use super::super::results;
 use super::super::results::{Computes, Demands};
-use super::super::services::SharedServices;
+use super::super::services::Services;
 use super::super::state::inspect::Inspected;
 use super::super::state::{Absent, Lookup, State};
 use touch2touch_core::align::Ask;
@@ -18,40 +16,30 @@ use touch2touch_core::which_tool::Candidate;
 use touch2touch_pipeline::compare::deviation::{self, Deviation};
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::steps::layers::{self, LayerResult};
-use touch2touch_pipeline::steps::pose::PoseResult;
-use touch2touch_pipeline::steps::tool::{NamedTool, named_tool};
+use touch2touch_pipeline::steps::tool::{NamedTool, named_tool, tool_file};
 
 impl Computes for RunKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<PoseResult>> {
-        let registered = results::registered(state, &self.pose)?;
-        let (registration, start) = (self.pose.registration, self.start.map(PoseBits::get));
-        Some(Job::new(Lane::Compute, "Registration, recorded", move |_| {
+    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Inspection>> {
+        let ((estimate, tool, sample), by) = (results::registered(state, &self.pose)?, self.pose.pose.as_ref()?.1);
+        let start = self.start.map(PoseBits::get);
+        Some(Job::new(Worker::Compute, "Registration, recorded", move |_| {
             let ask = Ask { starts: start.as_ref().map(std::slice::from_ref), record: true, ..Ask::default() };
-            registered.pose(registration, ask)
+            let run = estimate.pose_by(&sample, &tool.model, &*by.method(), ask)?;
+            let points = estimate.points().map_err(Clone::clone)?.clone();
+            Ok(Inspection::new(run, points, &tool.model, by))
         }))
+    }
+
+    fn arrived(&self, state: &mut State, _: &Arc<Inspection>) {
+        if let Some(at) = self.pose.place() {
+            state.results.latest.entry(at).or_default().inspection = Some(self.clone());
+        }
     }
 }
 
 /// The recorded registration from the registration's own starts; `None` while its inputs are not there.
 pub(crate) fn run_key(state: &State, source: ImprintSource) -> Option<RunKey> {
     Some(RunKey { pose: results::pose_key(state, source).ok()??, start: None })
-}
-
-impl Computes for InspectionKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Inspection>> {
-        let (registered, by) = (results::registered(state, &self.0.pose)?, self.0.pose.registration);
-        let run = state.results.runs.get(&self.0)?.clone();
-        Some(Job::new(Lane::Compute, "Steps of the registration", move |_| {
-            let points = registered.estimate.points().map_err(Clone::clone)?.clone();
-            Ok(Inspection::new(run, points, &registered.tool.model, by))
-        }))
-    }
-
-    fn arrived(&self, state: &mut State, _: &Arc<Inspection>) {
-        if let Some(at) = self.0.pose.cloud.place() {
-            state.results.latest.entry(at).or_default().inspection = Some(self.clone());
-        }
-    }
 }
 
 /// The recipe of the recorded run that is looked at; `Ok(None)` while something it is made from is missing.
@@ -68,22 +56,15 @@ pub fn inspection(state: &State) -> Lookup<'_, Arc<Inspection>> {
     if let failed @ Lookup::Failed(_) = results::tool(state) {
         return failed.without();
     }
-    let before = || state.results.inspections.get(results::latest(state, state.inspect.source)?.inspection.as_ref()?);
-    let key = inspection_key(state);
-    let run = key.clone().ok().flatten().and_then(|run| state.failure(run));
-    state.look_or(key.map(|key| key.map(InspectionKey)), before).or_failed(run)
+    let before = || state.results.runs.get(results::latest(state, state.inspect.source)?.inspection.as_ref()?);
+    state.look_or(inspection_key(state), before)
 }
 
-/// The steps that are looked at, or the recorded registration that they are of.
+/// The recorded registration that is looked at.
 pub(crate) fn want_inspection(wants: &mut Demands<'_>) {
     let state = wants.state;
     if let (true, Ok(Some(run))) = (results::shows_steps(state, state.inspect.source), inspection_key(state)) {
-        let there = state.results.runs.contains(&run);
-        let key = InspectionKey(run.clone());
-        match there || state.results.inspections.contains(&key) {
-            true => wants.ask(key),
-            false => wants.ask(run),
-        }
+        wants.ask(run);
     }
 }
 
@@ -103,10 +84,10 @@ pub(crate) fn inspected_in(state: &State, source: ImprintSource) -> Option<Inspe
 }
 
 impl Computes for LayersKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<LayerResult>> {
-        let estimate = state.results.clouds.get(&self.0.cloud)?.clone();
+    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<LayerResult>> {
+        let estimate = state.results.estimates.get(&self.0.its_cloud())?.clone();
         let run = state.results.runs.get(&self.run())?.clone();
-        Some(Job::new(Lane::Compute, "Layers of the registration", move |_| layers::layers(&estimate, &run)))
+        Some(Job::new(Worker::Compute, "Layers of the registration", move |_| layers::layers(&estimate, &run.result)))
     }
 }
 
@@ -129,11 +110,11 @@ pub(crate) fn want_layers(wants: &mut Demands<'_>, source: ImprintSource) {
 }
 
 impl Computes for DeviationKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Deviation>> {
-        let registered = results::registered(state, &self.0)?;
-        let pose = state.results.poses.get(&self.0)?.grasp_from_object;
-        Some(Job::new(Lane::Compute, "Distances to the model", move |_| {
-            Ok(deviation::deviation(registered.estimate.surface(), &registered.tool.model, pose))
+    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Deviation>> {
+        let (estimate, tool, _) = results::registered(state, &self.0)?;
+        let pose = results::pose_of(state, &self.0)?.grasp_from_object;
+        Some(Job::new(Worker::Compute, "Distances to the model", move |_| {
+            Ok(deviation::deviation(estimate.surface(), &tool.model, pose))
         }))
     }
 }
@@ -148,40 +129,40 @@ pub fn deviation(state: &State, source: ImprintSource) -> Lookup<'_, Deviation> 
 pub(crate) fn want_deviation(wants: &mut Demands<'_>, source: ImprintSource) {
     let state = wants.state;
     let Ok(Some(pose)) = results::pose_key(state, source) else { return };
-    if results::shows_deviation(state, source) && state.results.poses.contains(&pose) {
+    if results::shows_deviation(state, source) && results::pose_of(state, &pose).is_some() {
         wants.ask(DeviationKey(pose));
     }
 }
 
 impl Computes for RankingKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Vec<Candidate>>> {
+    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Vec<Candidate>>> {
         let open = state.library.open.as_ref()?;
-        let (source, registered, registration) =
-            (open.source.clone(), results::registered(state, &self.0)?, self.0.registration);
+        let ((estimate, _, sample), by) = (results::registered(state, &self.0)?, self.0.pose.as_ref()?.1);
+        let source = open.source.clone();
         let known = |name: String| {
             let key = ToolKey { dataset: open.seq, name: name.as_str().into() };
             (name, state.results.tools.get(&key).cloned())
         };
         let tools: Vec<(String, Option<Arc<NamedTool>>)> = open.index().tools().into_iter().map(known).collect();
-        Some(Job::new(Lane::Compute, "Which tool", move |cx| {
+        Some(Job::new(Worker::Compute, "Which tool", move |cx| {
             let mut models = Vec::with_capacity(tools.len());
             for (name, known) in tools {
                 if cx.cancel.is_cancelled() {
                     return Err(TaskError::cancelled("Which tool"));
                 }
                 // A model that cannot be used is no candidate.
-                let read = || Some(Arc::new(named_tool(&name, source.tool_mesh(&name).ok()?).ok()?));
+                let read = || Some(Arc::new(named_tool(&name, tool_file(&source.dataset, &name).ok()?.mesh).ok()?));
                 models.extend(known.or_else(read));
             }
             let tools = models.iter().map(|tool| (tool.name.as_str(), &tool.model));
-            registered.estimate.which_tool(&registered.sample, tools, &*registration.method())
+            estimate.which_tool(&sample, tools, &*by.method())
         }))
     }
 
     fn wanted(wants: &mut Demands<'_>) {
         for source in ImprintSource::iter() {
             if let Some(key) = ranking_key(wants.state, source)
-                && wants.state.results.poses.contains(&key.0)
+                && results::pose_of(wants.state, &key.0).is_some()
             {
                 wants.ask(key);
             }

@@ -1,10 +1,12 @@
 //! The tensors of a pair, its small picture, and what its GelSlim images leave open.
 
-use super::super::jobs::{Job, Lane};
+use std::sync::Arc;
+
+use super::super::jobs::{Job, Worker};
 use super::super::keys::{AmbiguityKey, PairKey, ThumbnailKey, TouchKey};
 use super::super::pane::Demand;
 use super::super::results::{self, Computes, Demands};
-use super::super::services::SharedServices;
+use super::super::services::Services;
 use super::super::state::{Absent, Lookup, State};
 use touch2touch_core::ambiguity::Ambiguity;
 use touch2touch_core::dataset::PairId;
@@ -16,10 +18,10 @@ use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::steps::imprint;
 
 impl Computes for PairKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Sample>> {
+    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Sample>> {
         let (source, pair) = (state.library.open.as_ref()?.source.clone(), self.pair);
         let what = format!("Load {}", state.library.entry(pair)?.name);
-        Some(Job::new(Lane::Files, what, move |_| source.load(pair)))
+        Some(Job::new(Worker::Files, what, move |_| source.load(pair)))
     }
 
     fn failed(&self, state: &mut State, _: &TaskError) -> bool {
@@ -64,11 +66,11 @@ pub fn truth(state: &State) -> Option<PlanarPose> {
 }
 
 impl Computes for ThumbnailKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<DepthMap>> {
+    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<DepthMap>> {
         let (source, pair) = (state.library.open.as_ref()?.source.clone(), self.0.pair);
         let loaded = state.results.samples.get(&self.0).cloned();
         let what = format!("Picture of {}", state.library.entry(pair)?.name);
-        Some(Job::new(Lane::Files, what, move |_| match loaded {
+        Some(Job::new(Worker::Files, what, move |_| match loaded {
             Some(sample) => Ok(imprint::thumbnail(&sample)),
             None => Ok(imprint::thumbnail(&source.load(pair)?)),
         }))
@@ -95,9 +97,9 @@ pub(crate) fn want_thumbnails(wants: &mut Demands<'_>) {
 }
 
 impl Computes for AmbiguityKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Self::Value>> {
+    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Self::Value>> {
         let (sample, finger) = (state.results.samples.get(&self.0.pair)?.clone(), self.0.finger);
-        Some(Job::new(Lane::Compute, "What the GelSlim image leaves open", move |_| {
+        Some(Job::new(Worker::Compute, "What the GelSlim image leaves open", move |_| {
             let gelslim = sample.pad(finger).and_then(|t| t.color());
             Ok(touch2touch_core::ambiguity::ambiguity(&gelslim.ok_or_else(gone)?.difference))
         }))

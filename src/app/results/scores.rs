@@ -7,11 +7,6 @@ use touch2touch_pipeline::scores::evaluate::Setup;
 use touch2touch_pipeline::steps::bundles::{BundleInfo, BundleKind};
 use touch2touch_pipeline::steps::recipe::Recipe;
 
-/// The setup by which all pairs of the open data set are scored: that of the results table, without leaving grasps out.
-pub(crate) fn setup_of_all(state: &State) -> Option<Setup> {
-    Some(Setup { grasps_per_tool: None, ..evaluation_setup(state)? })
-}
-
 /// The generators for the sensors of the data, and whether each gets a row.
 pub fn evaluated(state: &State) -> impl Iterator<Item = (&BundleInfo, bool)> {
     let rig = state.rig();
@@ -31,7 +26,6 @@ pub(crate) fn evaluation_setup(state: &State) -> Option<Setup> {
         bundles,
         classifier: recipe::bundle(state, BundleKind::Classifier).ok().map(|b| b.origin.clone()),
         recipe: Recipe { generator: None, ..recipe::in_force(state, ImprintSource::Measured) },
-        grasps_per_tool: state.table.grasps_per_tool,
         ..Setup::default()
     })
 }

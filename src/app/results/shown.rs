@@ -1,6 +1,6 @@
 //! The prediction shown for each touch: that of the settings in force, else an earlier one, which says so.
 
-use super::super::keys::{ImprintKey, ImprintSource, MetersKey, PictureKey, PredictionKey, TouchKey};
+use super::super::keys::{EstimateKey, ImprintKey, ImprintSource, PictureKey, PredictionKey, TouchKey};
 use super::super::recipe;
 use super::super::state::{Absent, Lookup, State};
 use touch2touch_core::grid::DepthMap;
@@ -41,7 +41,10 @@ pub(crate) fn imprint_of<'a>(state: &'a State, key: &ImprintKey) -> Lookup<'a, D
             let felt = sample.and_then(Absent::NoFinger, |sample| sample.pad(touch.finger));
             felt.and_then(Absent::NoBubble, |felt| Some(&felt.depth()?.imprint))
         }
-        ImprintKey::Predicted(recipe, shift) => state.look(MetersKey(recipe.clone(), *shift)).value(),
+        ImprintKey::Predicted(recipe, _) => {
+            let made = state.look(EstimateKey::imprint(key));
+            made.and_then(Absent::NoPrediction, |made| made.imprints[recipe.touch.finger].as_ref())
+        }
         ImprintKey::Mean(key) => state.look(key.clone()).value(),
         ImprintKey::Picture(touch) => state.look(PictureKey(*touch)).map(|found| &found.imprint),
     }

@@ -1,18 +1,20 @@
 //! The CAD model of a tool.
 
-use super::super::jobs::{Job, Lane};
+use std::sync::Arc;
+
+use super::super::jobs::{Job, Worker};
 use super::super::keys::ToolKey;
 use super::super::results::{Computes, Demands};
-use super::super::services::SharedServices;
+use super::super::services::Services;
 use super::super::state::{Absent, Lookup, State};
 use touch2touch_pipeline::error::TaskError;
-use touch2touch_pipeline::steps::tool::{NamedTool, named_tool};
+use touch2touch_pipeline::steps::tool::{NamedTool, named_tool, tool_file};
 
 impl Computes for ToolKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<NamedTool>> {
+    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<NamedTool>> {
         let (source, name) = (state.library.open.as_ref()?.source.clone(), self.name.clone());
         let what = format!("CAD model of {name}");
-        Some(Job::new(Lane::Compute, what, move |_| named_tool(&name, source.tool_mesh(&name)?)))
+        Some(Job::new(Worker::Compute, what, move |_| named_tool(&name, tool_file(&source.dataset, &name)?.mesh)))
     }
 
     fn failed(&self, _: &mut State, _: &TaskError) -> bool {

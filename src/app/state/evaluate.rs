@@ -9,16 +9,11 @@ use touch2touch_core::evaluation::{Condition, Metric, Row, Scores, paper_rows};
 use touch2touch_pipeline::scores::evaluate::Evaluation;
 use touch2touch_pipeline::steps::recipe::Recipe;
 
-/// Grasps of each tool that the studio offers; `None` is all of them.
-pub(crate) const GRASPS: [Option<usize>; 5] = [Some(2), Some(4), Some(10), Some(20), None];
-
 /// The table and how it is asked for.
 #[derive(Clone, Debug, Default)]
 pub struct TableState {
     /// Generators that get no row, by bundle.
     pub left_out: BTreeSet<Arc<str>>,
-    /// At most so many grasps of each tool.
-    pub grasps_per_tool: Option<usize>,
     /// True where published metrics are shown as well.
     pub published: bool,
     /// The last table of the open data set.

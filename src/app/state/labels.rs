@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::super::keys::{ImprintSource, PoseKey, Revision};
+use super::super::keys::{EstimateKey, ImprintSource, Revision};
 use touch2touch_core::grid::{DepthMap, Mask};
 use touch2touch_core::label::{DrawTool, Drawing, Ground, Provenance, VisiblePixels};
 use touch2touch_pipeline::error::TaskError;
@@ -73,7 +73,7 @@ pub struct Changed {
     /// The deed.
     pub name: Cow<'static, str>,
     /// The pose before, by its recipe.
-    pub before: Option<PoseKey>,
+    pub before: Option<EstimateKey>,
 }
 
 /// Labels that somebody else changed while they were being changed here.
@@ -101,7 +101,7 @@ pub struct Stroke {
     /// The places of its pixels in the 3D picture that it is drawn on.
     pub(in crate::app) seen: Option<VisiblePixels>,
     /// The pose before the stroke, as [`Changed::before`].
-    pub(in crate::app) pose: Option<PoseKey>,
+    pub(in crate::app) pose: Option<EstimateKey>,
     /// The hand mask before the stroke; `None` if there was none.
     pub(in crate::app) before: Option<DrawnMask>,
     /// The mask in force before the stroke, which is drawn on.

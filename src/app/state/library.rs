@@ -1,14 +1,14 @@
 //! The open data set, and the list of pairs as the browser shows it.
 
 use std::ops::Range;
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 use strum::EnumIter;
 
 use super::super::keys::{DatasetSeq, MaskRecipe, PairKey, PredictionKey};
-use super::super::source::DataSource;
+pub use super::super::source::Place;
+use super::super::source::Source;
 use super::evaluate::TableState;
 use super::labels::Document;
 use touch2touch_core::dataset::{Index, PairEntry, PairId};
@@ -16,25 +16,6 @@ use touch2touch_core::rig::{Rig, SensorKind};
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::labels::filter::Filter;
 use touch2touch_pipeline::steps::bundles::{BundleInfo, BundleKind, by_id};
-
-/// A place that can be opened.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Place {
-    /// The built-in simulated data.
-    Demo,
-    /// A folder, or a file in one.
-    Path(PathBuf),
-}
-
-impl std::fmt::Display for Place {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Demo => write!(f, "the demo"),
-            Self::Path(path) => write!(f, "{}", path.display()),
-        }
-    }
-}
 
 /// The order of the browser's list.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, EnumIter)]
@@ -67,28 +48,22 @@ impl Sort {
 }
 
 /// An open data set.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub struct OpenDataset {
     /// This opening.
     pub seq: DatasetSeq,
     /// The place.
     pub place: Place,
     /// The data.
-    pub source: Arc<dyn DataSource>,
+    pub source: Arc<Source>,
     /// The tools, sorted, each once.
     pub tools: Vec<String>,
-}
-
-impl std::fmt::Debug for OpenDataset {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "OpenDataset({:?}, {}, {} pairs)", self.seq, self.place, self.index().pairs.len())
-    }
 }
 
 impl OpenDataset {
     /// All pairs.
     pub fn index(&self) -> &Index {
-        self.source.index()
+        &self.source.dataset.index
     }
 
     /// The key of `pair` in this opening.

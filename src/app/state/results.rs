@@ -8,18 +8,16 @@ use std::sync::Arc;
 
 use super::super::keys::dataset::Read;
 use super::super::keys::{
-    CloudKey, Distances, ImprintSource, Inspection, InspectionKey, Keyed, PairKey, PoseKey, PredictionKey, Preview,
-    TouchKey,
+    Distances, EstimateKey, ImprintSource, Inspection, Keyed, PairKey, PredictionKey, Preview, RunKey, TouchKey,
 };
 use super::cache::Cache;
 use super::shown::Shown;
 use touch2touch_core::ambiguity::Ambiguity;
-use touch2touch_core::contact::ContactMask;
 use touch2touch_core::grid::{DepthMap, RgbGrid};
 use touch2touch_core::postprocess::Flag;
 use touch2touch_core::sample::Sample;
 use touch2touch_core::which_tool::Candidate;
-use touch2touch_pipeline::compare::deviation::{CloudDifference, Deviation};
+use touch2touch_pipeline::compare::deviation::Deviation;
 use touch2touch_pipeline::compare::{Beside, Comparison};
 use touch2touch_pipeline::doctor::Fact;
 use touch2touch_pipeline::export::Plan;
@@ -28,7 +26,6 @@ use touch2touch_pipeline::learn::train::TrainPlan;
 use touch2touch_pipeline::masks::propose::Proposal;
 use touch2touch_pipeline::steps::estimate::Estimate;
 use touch2touch_pipeline::steps::layers::LayerResult;
-use touch2touch_pipeline::steps::pose::PoseResult;
 use touch2touch_pipeline::steps::prediction::Prediction;
 use touch2touch_pipeline::steps::tool::NamedTool;
 
@@ -48,30 +45,20 @@ macro_rules! table {
         Tool(ToolKey => NamedTool, tool_bytes) in tools, 128 * MIB;
         /// The predictions of a touch that lie on the disk from before.
         Stored(StoredKey => Keyed);
-        /// Raw predictions. One is asked for because a pane needs it beside that of the other finger.
+        /// Raw predictions: of the pair on screen, of its other finger, of what is compared.
         Prediction(PredictionKey => Prediction, |made| made.raw.channels.iter().map(|c| c.len() * 4).sum()) in predictions, 256 * MIB;
-        /// A prediction of the pair on screen that nobody asked for: kept with the others.
-        Prefetch(PrefetchKey => Prediction);
         /// The mean of several predictions of one touch.
         Mean(MeanKey => DepthMap, |mean| mean.len() * 4) in means, 16 * MIB;
-        /// A prediction in meters, as large as the bubble image.
-        Imprint(MetersKey => DepthMap, |imprint| imprint.len() * 4) in imprints, 64 * MIB;
         /// A prediction of a color sensor: differences, 0..255 scale.
         Color(ColorKey => RgbGrid, |picture| picture.len() * 12) in colors, 32 * MIB;
         /// The prediction of another program that lies beside a pair as a picture.
         Picture(PictureKey => Beside, |found| 4 * (found.tile.len() + found.imprint.len())) in pictures, 16 * MIB;
-        /// A prediction that is compared with something: kept with the others.
-        Compared(ComparedKey => Prediction);
         /// Any two imprints of a touch against each other.
-        Versus(VersusKey => Comparison, |found| found.error.len() * 4) in versus, 64 * MIB;
-        /// The distances of the points of one cloud from another.
-        Apart(CloudDifferenceKey => CloudDifference, CloudDifference::bytes) in apart, 16 * MIB;
+        Comparison(ComparisonKey => Comparison, |found| found.error.len() * 4) in comparisons, 64 * MIB;
         /// Flags: implausible things about the way of a prediction to meters.
         Flags(FlagsKey => Vec<Flag>, |found| found.len() * 512) in flags, MIB;
         /// The ambiguity of a GelSlim image: what it leaves open.
         Ambiguity(AmbiguityKey => Option<Ambiguity>, |found| size_of_val(found)) in ambiguities, MIB;
-        /// An automatic mask.
-        Mask(MaskKey => ContactMask, |found| found.mask.len()) in masks, 32 * MIB;
         /// The plan of an export of masks: what it would write where.
         MaskPlan(MaskPlanKey => Plan, |plan| plan.total() * 128) in mask_plans, MIB;
         /// The plan of an import of masks: what it would change.
@@ -82,22 +69,16 @@ macro_rules! table {
         Proposal(ProposalKey => Proposal, |found| found.mask.len()) in proposals, 16 * MIB;
         /// The plan of a training of the mask model: what it would learn from.
         TrainPlan(TrainPlanKey => TrainPlan, |plan| (plan.masks() + plan.held_out[0]) * 256) in train_plans, MIB;
-        /// A cloud.
-        Cloud(CloudKey => Estimate, Estimate::bytes) in clouds, 128 * MIB;
-        /// A pose.
-        Pose(PoseKey => PoseResult, PoseResult::bytes) in poses, 32 * MIB;
-        /// A pose without its proof: shown until that is there.
-        ProvisionalPose(ProvisionalPoseKey => PoseResult, PoseResult::bytes) in provisional_poses, 3 * MIB;
-        /// A registration with everything recorded.
-        Run(RunKey => PoseResult, PoseResult::bytes) in runs, 32 * MIB;
+        /// An estimate: imprints, masks, cloud and pose as far as a pane needs them.
+        Estimate(EstimateKey => Estimate, Estimate::bytes) in estimates, 259 * MIB;
+        /// A registration with everything recorded, ready to be looked through.
+        Run(RunKey => Inspection, Inspection::bytes) in runs, 96 * MIB;
         /// Reasons, residuals and distances of a recorded registration from the registration's own starts.
         Layers(LayersKey => LayerResult, LayerResult::bytes) in layers, 16 * MIB;
         /// Signed distances between contact points and the registered model.
         Deviation(DeviationKey => Deviation, Deviation::bytes) in deviations, 63 * MIB;
         /// All tools of the data set, ranked for the touch of a pose.
         Ranking(RankingKey => Vec<Candidate>, |found| found.len() * size_of::<Candidate>()) in rankings, MIB;
-        /// The steps of a recorded registration, made ready to be looked through.
-        Inspection(InspectionKey => Inspection, Inspection::bytes) in inspections, 64 * MIB;
         /// A small picture of a pair's measured imprint (right finger, else left).
         Thumbnail(ThumbnailKey => DepthMap, |picture| picture.len() * 4) in thumbnails, 32 * MIB;
         }
@@ -127,11 +108,11 @@ pub(crate) trait Cached: Key + Into<Request> {
 #[derive(Clone, Debug, Default)]
 pub struct Latest {
     /// The cloud.
-    pub cloud: Option<CloudKey>,
+    pub cloud: Option<EstimateKey>,
     /// The pose.
-    pub pose: Option<PoseKey>,
+    pub pose: Option<EstimateKey>,
     /// The recorded registration.
-    pub inspection: Option<InspectionKey>,
+    pub inspection: Option<RunKey>,
 }
 
 macro_rules! results {

@@ -1,7 +1,7 @@
 //! The preferences of a person. Kept between runs; never part of undo.
 
+pub mod compare;
 pub mod scene;
-pub mod versus;
 
 use std::path::PathBuf;
 
@@ -12,6 +12,7 @@ use super::super::action::Action;
 use super::super::keys::{Preset, Registration, Sampler, ShiftMode, Spacing};
 use super::super::pane::Workspace;
 use super::library::Place;
+use compare::CompareChoice;
 use scene::SceneLook;
 use touch2touch_core::diffusion::{GUIDANCE, GenerateConfig};
 use touch2touch_core::label::{CleanKind, CleanUp, DrawTool, Layers, Paint};
@@ -23,7 +24,6 @@ pub use touch2touch_pipeline::masks::propose::ProposalSource;
 use touch2touch_pipeline::steps::bundles::BundleInfo;
 pub use touch2touch_pipeline::steps::mask::{MaskChoice, MaskSource};
 pub use touch2touch_pipeline::still::space::SpacePane;
-use versus::Versus;
 
 /// The version of the settings file: a file of another version is set aside and defaults are used.
 pub(crate) const SETTINGS_VERSION: u32 = 1;
@@ -70,8 +70,6 @@ pub struct Settings {
     pub cache_mib: u32,
     /// Who labels; empty: whom the system says.
     pub person: String,
-    /// True where the 3D views of prediction and measurement move together.
-    pub cameras_linked: bool,
     /// The look of the 3D views.
     pub scene: SceneLook,
     /// The sides that have a 3D view, where a person chose them for a workspace.
@@ -79,7 +77,7 @@ pub struct Settings {
     /// The GelSlim image that is shown.
     pub gel: GelView,
     /// The comparison of each workspace.
-    pub versus: std::collections::BTreeMap<Workspace, Versus>,
+    pub compare: std::collections::BTreeMap<Workspace, CompareChoice>,
     /// True where the mask is drawn over imprints.
     pub mask_visible: bool,
     /// True where only the outline of the mask is drawn.
@@ -138,11 +136,10 @@ impl Default for Settings {
             runtime: EngineChoice::default(),
             cache_mib: 512,
             person: String::new(),
-            cameras_linked: true,
             scene: SceneLook::default(),
             sides: std::collections::BTreeMap::new(),
             gel: GelView::default(),
-            versus: std::collections::BTreeMap::new(),
+            compare: std::collections::BTreeMap::new(),
             mask_visible: true,
             mask_outline: false,
             mask_opacity: 0.35,
@@ -160,8 +157,8 @@ impl Default for Settings {
 
 impl Settings {
     /// The comparison in the workspace in front.
-    pub fn versus_mut(&mut self) -> &mut Versus {
-        self.versus.entry(self.workspace).or_default()
+    pub fn compare_mut(&mut self) -> &mut CompareChoice {
+        self.compare.entry(self.workspace).or_default()
     }
 
     /// Brings numbers from a file or a text box back into the ranges that can be drawn and computed with.
@@ -204,8 +201,8 @@ impl Settings {
     }
 
     /// The comparison in the workspace in front.
-    pub fn compared(&self) -> Versus {
-        self.versus.get(&self.workspace).cloned().unwrap_or_default()
+    pub fn compared(&self) -> CompareChoice {
+        self.compare.get(&self.workspace).cloned().unwrap_or_default()
     }
 }
 

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::path::PathBuf;
 
-use super::super::jobs::Lane;
+use super::super::jobs::Worker;
 use super::super::keys::{DatasetSeq, PredictionKey};
 use super::super::state::results::Request;
 use touch2touch_pipeline::error::{TaskError, TaskErrorKind};
@@ -14,8 +14,8 @@ use touch2touch_pipeline::job::Progress;
 pub struct Ticket(pub u64);
 
 macro_rules! kinds {
-    ($( #[doc = $doc:literal] $kind:ident, $name:literal, $lane:ident, $kept:literal; )*) => {
-        /// A kind of job that a person can start. On [`Lane::Batch`] there is one of a kind at a time, and nobody waits for
+    ($( #[doc = $doc:literal] $kind:ident, $name:literal, $worker:ident, $kept:literal; )*) => {
+        /// A kind of job that a person can start. On [`Worker::Batch`] there is one of a kind at a time, and nobody waits for
         /// its end any more once another data set is open.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, strum::EnumIter)]
         pub enum TaskKind { $( #[doc = $doc] $kind, )* }
@@ -31,9 +31,9 @@ macro_rules! kinds {
                 match self { $( Self::$kind => $kept, )* }
             }
 
-            /// The lane that it runs on.
-            pub(crate) fn lane(self) -> Lane {
-                match self { $( Self::$kind => Lane::$lane, )* }
+            /// The worker that it runs on.
+            pub(crate) fn worker(self) -> Worker {
+                match self { $( Self::$kind => Worker::$worker, )* }
             }
         }
     };
@@ -77,7 +77,7 @@ kinds! {
 
 /// A job that a person started.
 #[derive(Clone, Debug)]
-pub struct Task {
+pub struct RunningTask {
     /// The kind.
     pub kind: TaskKind,
     /// The name on screen, e.g. `Generate data_4 right`.
@@ -98,7 +98,7 @@ pub struct Task {
 #[derive(Clone, Debug, Default)]
 pub struct Tasks {
     /// Jobs that a person started, by ticket.
-    pub running: BTreeMap<Ticket, Task>,
+    pub running: BTreeMap<Ticket, RunningTask>,
     /// The requests that the visible panes wait for: the list last handed to the runtime.
     pub demanded: Vec<Request>,
     /// Results that could not be computed, and why: they are not tried again until something changes.
@@ -108,12 +108,12 @@ pub struct Tasks {
 
 impl Tasks {
     /// The task that generates `recipe`.
-    pub fn generating(&self, recipe: &PredictionKey) -> Option<(Ticket, &Task)> {
+    pub fn generating(&self, recipe: &PredictionKey) -> Option<(Ticket, &RunningTask)> {
         self.running.iter().find(|(_, task)| task.recipes.contains(recipe)).map(|(t, task)| (*t, task))
     }
 
     /// A task that makes predictions.
-    pub(crate) fn any_generating(&self) -> Option<(Ticket, &Task)> {
+    pub(crate) fn any_generating(&self) -> Option<(Ticket, &RunningTask)> {
         self.running.iter().find(|(_, task)| !task.recipes.is_empty()).map(|(t, task)| (*t, task))
     }
 
@@ -123,7 +123,7 @@ impl Tasks {
     }
 
     /// The running task of a kind for the data set that is open.
-    pub fn of_kind(&self, kind: TaskKind) -> Option<(Ticket, &Task)> {
+    pub fn of_kind(&self, kind: TaskKind) -> Option<(Ticket, &RunningTask)> {
         let mut tasks = self.running.iter();
         tasks.find(|(_, task)| task.kind == kind && !task.outdated).map(|(ticket, task)| (*ticket, task))
     }

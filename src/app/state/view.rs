@@ -68,8 +68,6 @@ pub enum CameraPreset {
 pub enum UiRequest {
     /// Show the native dialog for a folder, or a path box; answer with `LibraryCommand::Open`.
     PickFolder,
-    /// Show the native dialog for a file, or a path box; answer with `LibraryCommand::Open`.
-    PickFile,
     /// Ask for the folder to write the results table to; answer with `EvaluateCommand::Export`.
     PickTableFolder,
     /// Ask where something is to be written; answer with `ExportCommand::Write`.
@@ -82,23 +80,16 @@ pub enum UiRequest {
     Close,
     /// Turn the 3D cameras.
     Camera(CameraPreset),
-    /// Write the camera of the 3D view under the pointer to the clipboard.
-    CopyCamera,
     /// Fit images and 3D views to their panes.
     Fit,
     /// Bring a pane of the workspace to the front.
     ShowPane(Pane),
     /// Save a picture of the window.
     Screenshot,
-    /// Save a picture of the pane under the pointer, or copy it.
-    PanePicture {
-        /// To the clipboard instead of a file.
-        copied: bool,
-    },
     /// Save a picture of a pane, or copy it.
-    PictureOf {
-        /// The pane.
-        pane: Pane,
+    PanePicture {
+        /// The pane; `None` for the one under the pointer.
+        pane: Option<Pane>,
         /// To the clipboard instead of a file.
         copied: bool,
     },

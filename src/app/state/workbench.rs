@@ -2,7 +2,6 @@
 //!
 //! Everything here lasts as long as the window. What a person decides with it (an accepted pose) is the document's.
 
-use glam::DVec3;
 use strum::EnumIter;
 
 use super::super::keys::{ImprintSource, PairKey, RunKey};
@@ -30,8 +29,8 @@ impl Layer {
     /// The name on screen.
     pub fn name(self) -> &'static str {
         match self {
-            Self::None => "None",
-            Self::Residuals => "Residuals",
+            Self::None => "One color",
+            Self::Residuals => "Residual",
             Self::Reasons => "Pixels used",
             Self::Distance => "Distance",
             Self::Correspondences => "Pull lines",
@@ -60,23 +59,8 @@ pub enum SceneTool {
     Look,
     /// Moves the tool.
     Pose,
-    /// Measures between two points.
-    Distance,
-    /// Measures at the second of three points.
-    Angle,
     /// Draws on the masks of the points, with the mask tool in hand.
     Paint,
-}
-
-impl SceneTool {
-    /// Points that make a measurement.
-    pub fn marks(self) -> usize {
-        match self {
-            Self::Look | Self::Pose | Self::Paint => 0,
-            Self::Distance => 2,
-            Self::Angle => 3,
-        }
-    }
 }
 
 /// A point that was clicked.
@@ -128,8 +112,6 @@ pub struct Workbench {
     pub hand: Option<ManualTry>,
     /// The point clicked last.
     pub picked: Option<Picked>,
-    /// Points of the measurement, meters, grasp frame, and the side they were clicked in.
-    pub marks: Vec<(ImprintSource, DVec3)>,
 }
 
 impl Default for Workbench {
@@ -142,7 +124,6 @@ impl Default for Workbench {
             side: ImprintSource::Measured,
             hand: None,
             picked: None,
-            marks: Vec::new(),
         }
     }
 }
@@ -152,7 +133,6 @@ impl Workbench {
     pub(in crate::app) fn leave_pair(&mut self) {
         self.hand = None;
         self.picked = None;
-        self.marks.clear();
     }
 
     /// The pose being set for one imprint.

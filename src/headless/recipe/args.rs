@@ -11,7 +11,7 @@ use super::super::args::keyed;
 use touch2touch_core::diffusion::{GUIDANCE, Sampler, Spacing};
 use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_pipeline::infer::engine::EngineChoice;
-use touch2touch_pipeline::steps::bundles::FoundBundles;
+use touch2touch_pipeline::steps::bundles::{self, BundleKind, FoundBundles};
 use touch2touch_pipeline::steps::recipe::ShiftChoice;
 
 /// Models, and how they are run.

@@ -13,16 +13,16 @@ use crate::app::evaluate::ScoreChoice;
 use crate::app::labels::Review;
 use crate::app::library::{Sort, short_name};
 use crate::app::results;
-use crate::app::scores::{Grade, SourceScores};
 use crate::app::tasks::TaskKind;
 use crate::ui::parts::cx::Cx;
-use crate::ui::parts::theme::{Palette, SMALL, caption};
+use crate::ui::parts::theme::{Palette, SMALL, caption, grade_color};
 use crate::ui::parts::widget::cut::cut_in_the_middle;
 use crate::ui::parts::widget::empty;
 use crate::ui::parts::widget::texture::depth_image;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::evaluation::Metric;
 use touch2touch_core::units::counted;
+use touch2touch_core::verdict::Grade;
 
 /// Height of a row, points.
 const ROW: f32 = 40.0;
@@ -67,7 +67,7 @@ fn title(cx: &Cx<'_>, ui: &mut Ui) {
     let library = &cx.state.library;
     let title = match (&library.opening, &library.open) {
         (Some(place), _) => format!("Opening {place}…"),
-        (None, Some(open)) => open.source.title().to_owned(),
+        (None, Some(open)) => open.source.dataset.title.clone(),
         (None, None) => return,
     };
     let label = egui::Label::new(RichText::new(&title).color(cx.p.strong)).truncate();
@@ -148,7 +148,7 @@ fn score_row(cx: &mut Cx<'_>, ui: &mut Ui) {
                 }
             }
         });
-        let tip = "Score to show, sort and filter by";
+        let tip = format!("Score to show, sort and filter by, of {}; Results chooses another source", by.short());
         response.response.accessible_name("Score").on_hover_text(tip);
         let text = if chosen.best_first { "Best first" } else { "Worst first" };
         let button = egui::Button::new(RichText::new(text).size(SMALL)).selected(sorted);
@@ -158,18 +158,6 @@ fn score_row(cx: &mut Cx<'_>, ui: &mut Ui) {
             next = Some(ScoreChoice { best_first: sorted && !chosen.best_first, ..chosen.clone() });
         }
     });
-    if table.scores.sources.len() > 1 {
-        let combo = egui::ComboBox::from_id_salt("source").width(ui.available_width());
-        let response = combo.selected_text(by.short()).truncate().show_ui(ui, |ui| {
-            for source in &table.scores.sources {
-                if ui.selectable_label(source.name == by.name, &*source.name).clicked() {
-                    next = Some(ScoreChoice { source: Some(source.name.clone()), ..chosen.clone() });
-                }
-            }
-        });
-        let tip = "Score of the measured imprints (the upper bound) or of a generator";
-        response.response.accessible_name("Source of the score").on_hover_text(tip);
-    }
     if let Some(next) = next {
         cx.push(LibraryCommand::SetScore(next));
     }
@@ -187,12 +175,12 @@ fn list(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
         if done > 0 {
             ui.label(RichText::new(format!("{done} done")).size(SMALL).color(cx.p.good));
         }
-        let problems = library.open.as_ref().map_or(0, |o| o.source.problems().len());
+        let problems = library.open.as_ref().map_or(0, |o| o.source.problems.len());
         if problems > 0 {
             let text = RichText::new(counted(problems, "problem")).size(SMALL).color(cx.p.caution);
             ui.label(text).on_hover_ui(|ui| {
                 if let Some(open) = &cx.state.library.open {
-                    for problem in open.source.problems().iter().take(12) {
+                    for problem in open.source.problems.iter().take(12) {
                         ui.label(format!("{}: {}", problem.file.display(), problem.what));
                         ui.label(caption(problem.hint.as_str(), cx.p));
                     }
@@ -252,39 +240,36 @@ fn list(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
     }
 }
 
-/// The progress of the scoring.
+/// The button that scores all pairs, or how far that is; the bar at the bottom of the window stops it.
 fn scoring(cx: &mut Cx<'_>, ui: &mut Ui) {
     let total = cx.state.library.pairs().len();
     let scored = cx.state.table.by().map_or(0, |(source, _)| source.scored);
-    let possible = Action::PredictAll.command(cx.state).is_some();
-    if (possible && scored < total) || cx.state.tasks.of_kind(TaskKind::Evaluate).is_some() {
-        predict_all(cx, ui, scored);
+    // The table of all scores has its own.
+    if cx.state.selection.panes.contains(&Pane::Results) {
+        return;
     }
-}
-
-/// The button that scores all pairs, or how far that is; the bar at the bottom of the window stops it.
-pub(crate) fn predict_all(cx: &mut Cx<'_>, ui: &mut Ui, scored: usize) {
-    let total = cx.state.library.pairs().len();
     ui.horizontal_wrapped(|ui| match cx.state.tasks.of_kind(TaskKind::Evaluate) {
         Some((_, task)) => {
             let text = format!("scoring {} of {}", task.progress.done, task.progress.total);
             ui.label(RichText::new(text).size(SMALL).color(cx.p.accent));
         }
-        None => {
+        None if scored < total && Action::PredictAll.command(cx.state).is_some() => {
             cx.action_button(ui, Action::PredictAll, "Predict all");
             ui.label(caption(format!("{scored} of {total} scored"), cx.p));
         }
+        None => {}
     });
 }
 
-/// The color of a score: by size where that means something on its own, else by how it stands among the others.
-pub(crate) fn score_color(p: &Palette, source: &SourceScores, metric: Metric, value: f64) -> Color32 {
-    match (metric, source.standing(metric, value)) {
-        (Metric::Angle, _) if value.is_nan() => p.wrong,
-        (Metric::Angle, _) => error_color(p, value),
-        (_, Grade::Worst) => p.wrong,
-        (_, Grade::Poor) => p.caution,
-        (_, Grade::Fine) => p.text,
+/// The color of a score, where its size means something on its own: of an angle's error and of a verdict.
+pub(crate) fn score_color(p: &Palette, metric: Metric, value: f64) -> Color32 {
+    match metric {
+        Metric::Angle if value.is_nan() => p.wrong,
+        Metric::Angle => error_color(p, value),
+        Metric::Verdict => {
+            Grade::iter().find(|grade| f64::from(*grade as u8) == value).map_or(p.text, |grade| grade_color(p, grade))
+        }
+        _ => p.text,
     }
 }
 
@@ -379,7 +364,7 @@ fn figure_text(cx: &Cx<'_>, pair: PairId) -> Option<(String, Color32)> {
     let table = &cx.state.table;
     let (source, metric) = table.by()?;
     let value = source.value(pair, metric)?;
-    Some((metric.text(value), score_color(cx.p, source, metric, value)))
+    Some((metric.text(value), score_color(cx.p, metric, value)))
 }
 
 /// The picture of a pair's measured imprint, if it is there.

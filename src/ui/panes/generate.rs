@@ -7,7 +7,7 @@ use strum::IntoEnumIterator as _;
 
 use crate::app::action::Action;
 use crate::app::command::{Pane, PredictCommand};
-use crate::app::keys::{PredictionKey, Preset, Sampler, ShiftMode, VersusKey, shift_name, shift_tooltip};
+use crate::app::keys::{ComparisonKey, PredictionKey, Preset, Sampler, ShiftMode, shift_name, shift_tooltip};
 use crate::app::settings::{GenerateSettings, STEPS};
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{SMALL, caption, section, value};
@@ -39,6 +39,8 @@ pub(crate) type Memory = ();
 pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
     crate::ui::parts::theme::pane_frame(cx.p).show(ui, |ui| {
         ui.set_min_size(ui.available_size());
+        // Above what scrolls: it is in sight in the lowest window.
+        run(cx, ui);
         ScrollArea::vertical().id_salt("generate").show(ui, |ui| {
             let bundle = recipe::bundle(cx.state, BundleKind::Generator).ok();
             let spelt_out = cx.state.settings.generate.spelt_out(bundle);
@@ -47,7 +49,6 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
             presets(cx, ui, &mut new);
             mapping(cx, ui);
             fit_parts(cx, ui);
-            run(cx, ui);
             let more = egui::CollapsingHeader::new(RichText::new("More").size(SMALL)).id_salt("more of generate");
             let more = more.show(ui, |ui| numbers(cx, ui, &mut new));
             more.header_response.on_hover_text("Sampler, steps, seed, previews");
@@ -182,7 +183,6 @@ fn reset(response: egui::Response, tip: &str, default: &str, mut set: impl FnMut
 }
 
 fn run(cx: &mut Cx<'_>, ui: &mut Ui) {
-    ui.add_space(2.0);
     let running = cx.state.tasks.any_generating();
     let width = ui.available_width();
     match running {
@@ -305,8 +305,8 @@ fn results(cx: &mut Cx<'_>, ui: &mut Ui) {
         let psnr = cx
             .state
             .results
-            .versus
-            .get(&VersusKey::measured(recipe.clone(), shift))
+            .comparisons
+            .get(&ComparisonKey::measured(recipe.clone(), shift))
             .and_then(|c| c.psnr_db)
             .map_or(String::new(), |v| format!("{v:.1} dB"));
         let prediction = cx.state.results.predictions.get(recipe);
@@ -328,24 +328,6 @@ fn results(cx: &mut Cx<'_>, ui: &mut Ui) {
             ui.label(caption(format!("{} steps", recipe.config.steps), cx.p));
             ui.label(value(psnr, cx.p).size(SMALL));
             ui.label(caption(seconds, cx.p)).on_hover_text(took);
-            let reuse = ui.add(egui::Button::new(RichText::new("Use").size(SMALL)).min_size(vec2(30.0, 18.0)));
-            let reuse = reuse.accessible_name(format!("Use seed {}", recipe.config.seed));
-            if reuse.on_hover_text("Use these settings from now on").clicked() {
-                let config = recipe.config;
-                cx.push(prefer(move |s| {
-                    s.generate = GenerateSettings {
-                        preset: None,
-                        steps: config.steps,
-                        seed: config.seed,
-                        seed_locked: true,
-                        sampler: config.sampler,
-                        eta: config.eta,
-                        spacing: config.spacing,
-                        guidance: config.guidance,
-                        ..s.generate.clone()
-                    }
-                }));
-            }
         });
     }
 }

@@ -1,9 +1,10 @@
 //! The image panes: GelSlim, measured and predicted imprint. Linked pan, zoom and cross-hair.
 
 pub(crate) mod bar;
-pub(crate) mod link;
+mod link;
 mod paint;
 
+use std::hash::Hash;
 use std::sync::Arc;
 
 use eframe::egui::{Align2, Button, Color32, ComboBox, Rect, RichText, Ui, UiBuilder, pos2, vec2};
@@ -293,23 +294,47 @@ pub(crate) fn absent_text(cx: &mut Cx<'_>, ui: &mut Ui, absent: Absent) {
     }
 }
 
+/// The canvas of a picture of `size` pixels, moved together with all others of its sensor.
+pub(crate) fn canvas(
+    cx: &mut Cx<'_>,
+    ui: &mut Ui,
+    sensor: SensorKind,
+    label: &str,
+    size: [usize; 2],
+    primary: Primary,
+) -> CanvasOutput {
+    let color = sensor == SensorKind::Color;
+    let rotated = color && cx.state.rig().turned();
+    let view = if color { &mut cx.shared.views.gel } else { &mut cx.shared.views.bubble };
+    ImageCanvas { label, size, rotated, primary, background: cx.p.canvas }.show(ui, view)
+}
+
+/// Paints an imprint in the colors of all; its histogram. It is made again where its recipe changes.
+pub(crate) fn paint_depth(
+    cx: &mut Cx<'_>,
+    ui: &Ui,
+    output: &CanvasOutput,
+    (slot, recipe): (impl Hash, impl Hash),
+    depth: &DepthMap,
+    tint: Color32,
+) -> Option<Histogram> {
+    let squares = shows_squares(&output.map, ui.pixels_per_point());
+    let (map, range) = (map_of(cx.state), range_of(cx.state));
+    let key = (recipe, map, range.lo.to_bits(), range.hi.to_bits());
+    let make = || (depth_image(depth, map, range), Histogram::of(depth.as_slice()));
+    let picture = cx.shared.textures.get(ui.ctx(), slot, key, squares, make);
+    output.paint(picture.texture.id(), tint);
+    picture.histogram.clone()
+}
+
 fn gel_image(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, finger: PadId, lookup: Lookup<'_, RgbGrid>) {
     let Some(image) = lookup.shown() else {
         let size = usual_size(cx, SensorKind::Color);
         return placeholder(cx, ui, (pane, finger), lookup, size);
     };
     let Some(touch) = cx.state.touch_key(finger) else { return };
-    let mut view = cx.shared.views.gel;
     let label = format!("{} {}", pane.title(), cx.state.finger_name(finger));
-    let canvas = ImageCanvas {
-        label: &label,
-        size: image.size(),
-        rotated: cx.state.rig().turned(),
-        primary: Primary::Pan,
-        background: cx.p.canvas,
-    };
-    let output = canvas.show(ui, &mut view);
-    cx.shared.views.gel = view;
+    let output = canvas(cx, ui, SensorKind::Color, &label, image.size(), Primary::Pan);
     let squares = shows_squares(&output.map, ui.pixels_per_point());
     let recipe = results::chosen(cx.state, finger).filter(|_| pane == Pane::Predicted);
     let shown = cx.state.settings.gel;
@@ -398,23 +423,14 @@ fn depth_pane(
         && cx.state.settings.mask.tool != MaskTool::Pan
         && cx.state.document.is_editable(cx.state.pair_name());
     let primary = if paintable { Primary::Caller } else { Primary::Pan };
-    let mut view = cx.shared.views.bubble;
     let label = format!("{} {}", pane.title(), cx.state.finger_name(finger));
-    let canvas = ImageCanvas { label: &label, size: depth.size(), rotated: false, primary, background: cx.p.canvas };
-    let output = canvas.show(ui, &mut view);
-    cx.shared.views.bubble = view;
-    let squares = shows_squares(&output.map, ui.pixels_per_point());
-    let (map, range) = (map_of(cx.state), range_of(cx.state));
-    let key = (&recipe, map, range.lo.to_bits(), range.hi.to_bits());
-    let picture = cx.shared.textures.get(ui.ctx(), (pane, finger), key, squares, || {
-        (depth_image(depth, map, range), Histogram::of(depth.as_slice()))
-    });
-    let (texture, histogram) = (picture.texture.id(), picture.histogram.clone());
-    output.paint(texture, if stale { Color32::from_gray(130) } else { Color32::WHITE });
+    let output = canvas(cx, ui, SensorKind::Depth, &label, depth.size(), primary);
+    let tint = if stale { Color32::from_gray(130) } else { Color32::WHITE };
+    let histogram = paint_depth(cx, ui, &output, ((pane, finger), &recipe), depth, tint);
     if !paint::is_bared(ui) {
         paint::mask(cx, ui, memory, &output, source, finger);
     }
-    marks(cx, &output, finger);
+    window(cx, &output, finger);
     if let Some(px) = output.hovered {
         readout(cx, &output, pane, finger, depth, px);
         hover(cx, finger, px);
@@ -453,28 +469,14 @@ fn depth_pane(
 /// A prediction on its way, in the colors and the place of the result: nothing can be painted or measured on it.
 fn preview_image(cx: &mut Cx<'_>, ui: &mut Ui, finger: PadId, preview: &Arc<Preview>) -> Option<Histogram> {
     let pane = Pane::Predicted;
-    let mut view = cx.shared.views.bubble;
     let label = format!("{} {}, preview", pane.title(), cx.state.finger_name(finger));
-    let canvas = ImageCanvas {
-        label: &label,
-        size: preview.picture.depth.size(),
-        rotated: false,
-        primary: Primary::Pan,
-        background: cx.p.canvas,
-    };
-    let output = canvas.show(ui, &mut view);
-    cx.shared.views.bubble = view;
-    let squares = shows_squares(&output.map, ui.pixels_per_point());
-    let (map, range) = (map_of(cx.state), range_of(cx.state));
-    let key = (&preview.recipe, preview.picture.step, map, range.lo.to_bits(), range.hi.to_bits());
-    let picture = cx.shared.textures.get(ui.ctx(), (pane, finger), key, squares, || {
-        (depth_image(&preview.picture.depth, map, range), Histogram::of(preview.picture.depth.as_slice()))
-    });
-    let (texture, histogram) = (picture.texture.id(), picture.histogram.clone());
-    output.paint(texture, Color32::WHITE);
-    marks(cx, &output, finger);
+    let depth = &preview.picture.depth;
+    let output = canvas(cx, ui, SensorKind::Depth, &label, depth.size(), Primary::Pan);
+    let recipe = (&preview.recipe, preview.picture.step);
+    let histogram = paint_depth(cx, ui, &output, ((pane, finger), recipe), depth, Color32::WHITE);
+    window(cx, &output, finger);
     if let Some(px) = output.hovered {
-        readout(cx, &output, pane, finger, &preview.picture.depth, px);
+        readout(cx, &output, pane, finger, depth, px);
         hover(cx, finger, px);
     }
     output.caption(Align2::LEFT_TOP, &finger_text(cx.state, finger), cx.p.strong_on_image());
@@ -483,8 +485,8 @@ fn preview_image(cx: &mut Cx<'_>, ui: &mut Ui, finger: PadId, preview: &Arc<Prev
     histogram
 }
 
-/// Marks on an imprint that a person can switch.
-fn marks(cx: &Cx<'_>, output: &CanvasOutput, finger: PadId) {
+/// The window of the GelSlim on an imprint, where it is shown.
+pub(crate) fn window(cx: &Cx<'_>, output: &CanvasOutput, finger: PadId) {
     if let Some(link) = Link::of(&cx.state.rig(), finger).filter(|_| cx.state.settings.footprint_visible) {
         output.dashed_rect(link.window, Color32::from_gray(235));
     }
@@ -501,22 +503,15 @@ fn captions(cx: &Cx<'_>, output: &CanvasOutput, pane: Pane, finger: PadId) {
     }
 }
 
-/// The value under the pointer, in millimeters and in the unit that is stored.
+/// The value under the pointer, in millimeters.
 fn readout(cx: &mut Cx<'_>, output: &CanvasOutput, pane: Pane, finger: PadId, depth: &DepthMap, px: [f32; 2]) {
     let Some((x, y)) = output.map.pixel(px) else { return };
     let Some(v) = depth.get(x, y).copied() else { return };
     let name = pane.title();
     let note = scale_note(cx.state);
     let note = if note.is_empty() { String::new() } else { format!(" ({note})") };
-    cx.shared.readout = Some(if v.is_finite() {
-        format!(
-            "{name} {} ({x}, {y})   {}{note}   {v:.6} m",
-            cx.state.finger_name(finger),
-            units::text_mm(f64::from(v))
-        )
-    } else {
-        format!("{name} {} ({x}, {y})   no measurement", cx.state.finger_name(finger))
-    });
+    let value = if v.is_finite() { format!("{}{note}", units::text_mm(f64::from(v))) } else { "no measurement".into() };
+    cx.shared.readout = Some(format!("{name} {} ({x}, {y})   {value}", cx.state.finger_name(finger)));
 }
 
 /// The small square in the color of a side, beside the pane's title.

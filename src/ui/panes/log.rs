@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::Duration;
 
-use eframe::egui::{self, Align, Color32, Layout, Panel, RichText, ScrollArea, Ui};
+use eframe::egui::{self, Align, Color32, Layout, RichText, ScrollArea, Ui, vec2};
 
 use crate::app::action::Action;
 use crate::app::command::{Pane, TasksCommand};
@@ -71,10 +71,11 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
     });
 }
 
-/// Warnings, errors and what was saved, as far as they were not seen yet: lines above the status bar, over nothing.
+/// Warnings, errors and what was saved, as far as they were not seen yet: lines above the status bar, over the
+/// panes, of which none is moved.
 /// All but errors go by themselves, after a while or with their pair.
-pub(crate) fn notices(cx: &mut Cx<'_>, ui: &mut Ui) {
-    let (state, now) = (cx.state, ui.input(|i| i.time));
+pub(crate) fn notices(cx: &mut Cx<'_>, ctx: &egui::Context) {
+    let (state, now) = (cx.state, ctx.input(|i| i.time));
     let came = &mut cx.shared.notes;
     let mut unseen = Vec::new();
     for entry in state.log.unseen().filter(|e| e.level >= Level::Warning || e.place.is_some() || e.changed.is_some()) {
@@ -84,13 +85,15 @@ pub(crate) fn notices(cx: &mut Cx<'_>, ui: &mut Ui) {
             unseen.push(entry);
         }
         if !stays && now - since < STAYS_S {
-            ui.ctx().request_repaint_after(Duration::from_secs_f64(STAYS_S - (now - since)));
+            ctx.request_repaint_after(Duration::from_secs_f64(STAYS_S - (now - since)));
         }
     }
     let Some(last) = unseen.iter().map(|e| e.number).max() else { return };
     let hidden = unseen.len().saturating_sub(MOST);
-    let frame = egui::Frame::new().fill(cx.p.panel).inner_margin(egui::Margin::symmetric(12, 3));
-    Panel::bottom("notices").frame(frame).resizable(false).show(ui, |ui| {
+    let area = egui::Area::new(egui::Id::unique("notices")).anchor(egui::Align2::RIGHT_BOTTOM, vec2(-8.0, -32.0));
+    let width = (ctx.content_rect().width() - 32.0).min(640.0);
+    let (p, content) = (cx.p, |ui: &mut Ui| {
+        ui.set_width(width);
         for (index, entry) in unseen.iter().rev().take(MOST).enumerate() {
             ui.horizontal(|ui| {
                 ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
@@ -115,6 +118,9 @@ pub(crate) fn notices(cx: &mut Cx<'_>, ui: &mut Ui) {
                 });
             });
         }
+    });
+    area.show(ctx, |ui| {
+        egui::Frame::popup(ui.style()).fill(p.panel).inner_margin(egui::Margin::symmetric(12, 3)).show(ui, content);
     });
 }
 

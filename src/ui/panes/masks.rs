@@ -15,11 +15,10 @@ use crate::app::keys::ImprintSource;
 use crate::app::labels::Review;
 use crate::app::settings::{BRUSH_RADIUS_PX, CLEAN_MM, MaskSettings, MaskTool, ToolRow};
 use crate::app::state::Lookup;
-use crate::app::workbench::SceneTool;
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{CONTACT, IGNORED, PROPOSED, SMALL, caption, section};
 use crate::ui::parts::widget::icon::{self, Icon};
-use touch2touch_core::label::{DrawTool, Layers, Paint};
+use touch2touch_core::label::{DrawTool, Paint};
 use touch2touch_core::units;
 use touch2touch_pipeline::labels::MAX_NOTE;
 
@@ -52,10 +51,8 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
             source::show(cx, ui);
             fold(ui, "Clean up", "One-click clean-ups of the mask", |ui| clean_ups(cx, ui));
             note(cx, ui, memory);
-            fold(ui, "More", "Overlays, drawing in 3D, which mask is edited", |ui| {
-                overlay(cx, ui);
+            fold(ui, "More", "Opacity, which mask is edited", |ui| {
                 opacity(cx, ui);
-                in_3d(cx, ui);
                 correct(cx, ui);
             });
             progress::show(cx, ui);
@@ -118,24 +115,6 @@ fn tools(cx: &mut Cx<'_>, ui: &mut Ui) {
                 }
             });
         });
-    });
-}
-
-/// Drawing on the points of the 3D views, and what that reaches.
-fn in_3d(cx: &mut Cx<'_>, ui: &mut Ui) {
-    ui.horizontal_wrapped(|ui| {
-        ui.spacing_mut().item_spacing.x = 4.0;
-        ui.label(caption("In 3D", cx.p));
-        let on = cx.state.workbench.tool == SceneTool::Paint;
-        cx.action_switch(ui, Action::PaintIn3d, "draw", on);
-        let now = cx.state.settings.mask.layers;
-        for (layers, text) in [(Layers::Front, "front-most"), (Layers::All, "all layers")] {
-            let button = ui.add(egui::Button::selectable(now == layers, text));
-            let tip = format!("Drawing in 3D marks {}", layers.name());
-            if button.on_hover_text(Action::PaintLayers.behind(&tip)).clicked() && now != layers {
-                cx.act(Action::PaintLayers);
-            }
-        }
     });
 }
 
@@ -258,10 +237,8 @@ fn correct(cx: &mut Cx<'_>, ui: &mut Ui) {
 fn effect(cx: &Cx<'_>, ui: &mut Ui) {
     let Some(changed) = cx.state.document.changed.as_ref().filter(|c| c.pair == cx.state.pair_name()) else { return };
     let deg = |rad: f64| units::text_deg(rad);
-    let before = changed.before.as_ref().and_then(|key| cx.state.results.poses.get(key));
-    let provisional = results::provisional_pose(cx.state, changed.source);
-    let now = provisional.map_or_else(|| results::pose(cx.state, changed.source), |pose| Lookup::Ready(&**pose));
-    let (text, color) = match (now, before) {
+    let before = changed.before.as_ref().and_then(|key| results::pose_of(cx.state, key));
+    let (text, color) = match (results::pose(cx.state, changed.source), before) {
         (Lookup::Ready(pose), Some(before)) => {
             let (from, to) = (before.angle_rad, pose.angle_rad);
             let change = units::wrap_angle(to - from).to_degrees();
@@ -275,9 +252,6 @@ fn effect(cx: &Cx<'_>, ui: &mut Ui) {
                     false if to < from => cx.p.good,
                     false => cx.p.caution,
                 };
-            }
-            if provisional.is_some() {
-                text += ", checking…";
             }
             (text, color)
         }
@@ -376,23 +350,6 @@ fn note(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
     }
     let tip = "A note about this pair. The list marks pairs with notes, and its filter searches them";
     response.on_hover_text(tip);
-}
-
-/// Switches of the layers over the imprints.
-fn overlay(cx: &mut Cx<'_>, ui: &mut Ui) {
-    let settings = &cx.state.settings;
-    let switches = [
-        (Action::MaskVisible, "mask", settings.mask_visible),
-        (Action::MaskOutline, "outline", settings.mask_outline),
-        (Action::Footprint, "GelSlim window", settings.footprint_visible),
-    ];
-    ui.horizontal_wrapped(|ui| {
-        ui.spacing_mut().item_spacing = vec2(4.0, 4.0);
-        ui.label(caption("Show", cx.p));
-        for (action, text, on) in switches {
-            cx.action_switch(ui, action, text, on);
-        }
-    });
 }
 
 fn opacity(cx: &mut Cx<'_>, ui: &mut Ui) {

@@ -1,7 +1,7 @@
 //! The selected pair in words and figures: the verdict on its pose, the prediction against the truth.
 
 use crate::app::results;
-use eframe::egui::{Align, Button, Label, Layout, RichText, ScrollArea, Ui};
+use eframe::egui::{Button, Label, RichText, ScrollArea, Ui};
 
 use super::{images, scene};
 use crate::app::action::{Action, with_keys};
@@ -85,7 +85,7 @@ fn tools(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, pose: &PoseResult)
 fn pose(cx: &mut Cx<'_>, ui: &mut Ui) {
     for source in ImprintSource::iter() {
         ui.add_space(4.0);
-        ui.horizontal(|ui| {
+        ui.horizontal_wrapped(|ui| {
             ui.spacing_mut().item_spacing.x = 6.0;
             images::side_mark(ui, cx.p, source);
             ui.label(source.name());
@@ -100,12 +100,6 @@ fn pose(cx: &mut Cx<'_>, ui: &mut Ui) {
                 }
             }
         });
-        if let Lookup::Failed(err) = results::pose(cx.state, source)
-            && let Some(offer) = err.units.clone()
-        {
-            let place = format!("{}, in the metrics", source.name().to_lowercase());
-            ui.horizontal_wrapped(|ui| images::unit_buttons(cx, ui, &offer, &place));
-        }
         if let Some(pose) = results::pose(cx.state, source).shown() {
             verdict(cx, ui, pose);
             tools(cx, ui, source, pose);
@@ -114,15 +108,13 @@ fn pose(cx: &mut Cx<'_>, ui: &mut Ui) {
     }
 }
 
-/// The angle with its standard deviation, and at the right how far it is off where the truth is known.
+/// The angle with its standard deviation, and how far it is off where the truth is known; in a narrow pane below it.
 fn angle(cx: &Cx<'_>, ui: &mut Ui, pose: &PoseResult) {
     ui.label(value(pose.angle_text(), cx.p)).on_hover_text("Angle of the tool in the hand ± standard deviation");
     if let (Some(truth), Some(error)) = (pose.truth_rad, pose.error_rad) {
-        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            let text = RichText::new(format!("off by {}", units::text_deg(error))).size(SMALL);
-            let label = ui.label(text.color(scene::error_color(cx.p, error)));
-            label.on_hover_text(format!("The true angle is {}", units::text_deg(truth)));
-        });
+        let text = RichText::new(format!("off by {}", units::text_deg(error))).size(SMALL);
+        let label = ui.label(text.color(scene::error_color(cx.p, error)));
+        label.on_hover_text(format!("The true angle is {}", units::text_deg(truth)));
     }
 }
 

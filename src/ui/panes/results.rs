@@ -1,55 +1,102 @@
-//! The paper's results table of the open data set: what is compared, how far it is, and the figures.
+//! One table of scores: a row for each method over all pairs, then a row for each pair by the method that is chosen.
 
 use eframe::egui::{
-    self, Align2, Color32, FontId, Rect, RichText, Role, ScrollArea, Sense, Ui, WidgetInfo, pos2, vec2,
+    Align2, Color32, FontId, Rect, RichText, Role, ScrollArea, Sense, Shape, Stroke, Ui, WidgetInfo, pos2, vec2,
 };
 
+use super::browser::score_color;
 use crate::app::action::Action;
-use crate::app::command::{Command, Pane};
-use crate::app::evaluate::{EvaluateCommand, GRASPS};
+use crate::app::command::{Command, LibraryCommand, Pane};
+use crate::app::evaluate::{EvaluateCommand, ScoreChoice};
+use crate::app::library::{Sort, short_name};
 use crate::app::results;
+use crate::app::scores::SourceScores;
 use crate::app::tasks::TaskKind;
 use crate::ui::parts::cx::Cx;
-use crate::ui::parts::theme::{SMALL, caption, medium, section};
+use crate::ui::parts::theme::{SMALL, medium};
+use crate::ui::parts::widget::cut::cut_in_the_middle;
 use crate::ui::parts::widget::empty;
-use touch2touch_core::evaluation::{Column, Group, Row, TableMetrics, columns};
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::evaluation::{Column, Group, Metric, Row, TableMetrics, columns};
 
 /// Height of a row, points.
 const ROW: f32 = 20.0;
-/// Share of the width that the method's name takes, in letters.
-const NAME: f32 = 30.0;
+/// Widths of the columns of pair and tool, points; a method has both.
+const NAMES: [f32; 2] = [90.0, 110.0];
+/// The columns that are always shown, by their names in files.
+const FEW: [&str; 7] =
+    ["psnr_db", "psnr_noise_free_db", "ssim", "angle_deg", "success_5", "position_mm", "verdict_good"];
 
-/// Nothing is kept between frames.
-pub(crate) type Memory = ();
+/// Choice of the columns.
+#[derive(Default)]
+pub(crate) struct Memory {
+    /// True where all columns are shown.
+    more: bool,
+}
+
+/// A row below the head.
+enum Line<'a> {
+    Group(Group),
+    Method(&'a Row, &'a TableMetrics),
+    Pair(PairId),
+}
 
 /// The pane.
-pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
+pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
     crate::ui::parts::theme::pane_frame(cx.p).show(ui, |ui| {
         ui.set_min_size(ui.available_size());
-        choices(cx, ui);
-        ui.separator();
+        choices(cx, ui, memory);
         let rows = cx.state.table.rows();
-        if rows.is_empty() {
+        let Some(result) = cx.state.table.result.clone() else {
             let (what, why) = match cx.state.tasks.of_kind(TaskKind::Evaluate) {
-                Some(_) => ("The table appears when all grasps are scored", "Cancel keeps the scores so far"),
-                None => (
-                    "No results yet",
-                    "The paper's table: PSNR, SSIM, angle error and success rate of each chosen generator",
-                ),
+                Some(_) => ("The table appears when all pairs are scored", "Cancel keeps the scores so far"),
+                None => {
+                    ("No results yet", "PSNR, SSIM, angle error and verdict of every pair by each chosen generator")
+                }
             };
-            let action = Action::EvaluateDataset.command(cx.state);
-            let action = action.map(|_| (Action::EvaluateDataset.name(), Action::EvaluateDataset.tooltip()));
+            let action = Action::PredictAll.command(cx.state);
+            let action = action.map(|_| (Action::PredictAll.name(), Action::PredictAll.tooltip()));
             if empty::show(ui, what, why, action) {
-                cx.act(Action::EvaluateDataset);
+                cx.act(Action::PredictAll);
             }
             return;
+        };
+        ui.horizontal(|ui| {
+            let about: Vec<&str> =
+                std::iter::once(result.conventions).chain(result.notes.iter().map(String::as_str)).collect();
+            ui.label(RichText::new(result.size()).color(cx.p.strong)).on_hover_text(about.join("\n"));
+            if !result.complete {
+                ui.label(RichText::new("stopped early").size(SMALL).color(cx.p.caution));
+            }
+        });
+        let shown: Vec<&Column> =
+            columns(&rows).into_iter().filter(|column| memory.more || FEW.contains(&column.key)).collect();
+        head(cx, ui, &shown);
+        let mut groups = result.groups.clone();
+        groups.sort_unstable();
+        let mut lines = Vec::new();
+        for group in groups {
+            lines.push(Line::Group(group));
+            lines.extend(
+                rows.iter().filter_map(|row| Some(Line::Method(row, row.groups.iter().find(|f| f.group == group)?))),
+            );
         }
-        table(cx, ui, &rows);
+        lines.extend(cx.state.library.order.iter().copied().map(Line::Pair));
+        ui.spacing_mut().item_spacing.y = 0.0;
+        ScrollArea::vertical().auto_shrink(false).id_salt("results").show_rows(ui, ROW, lines.len(), |ui, range| {
+            for line in &lines[range] {
+                match line {
+                    Line::Group(group) => method_head(cx, ui, *group),
+                    Line::Method(row, figures) => method(cx, ui, row, figures, &shown),
+                    Line::Pair(pair) => pair_row(cx, ui, *pair, &shown),
+                }
+            }
+        });
     });
 }
 
 /// Choice of what is compared, and the buttons.
-fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
+fn choices(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = vec2(8.0, 4.0);
         let bundles: Vec<_> = results::evaluated(cx.state).map(|(b, chosen)| (b.clone(), chosen)).collect();
@@ -58,187 +105,200 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
         }
         for (bundle, chosen) in bundles {
             let mut on = chosen;
-            let tip = format!("Include this generator ({})", bundle.origin);
+            let tip = format!("Include this generator ({}), with its own steps and seed", bundle.origin);
             if ui.checkbox(&mut on, &bundle.name).on_hover_text(tip).changed() {
                 cx.push(Command::Evaluate(EvaluateCommand::Choose(bundle.id.clone(), on)));
             }
         }
-    });
-    ui.horizontal_wrapped(|ui| {
-        ui.label(caption("Grasps to use per tool", cx.p));
-        let name = |n: Option<usize>| n.map_or_else(|| "all".to_owned(), |n| n.to_string());
-        let now = cx.state.table.grasps_per_tool;
-        let combo = egui::ComboBox::from_id_salt("grasps").width(48.0).selected_text(name(now));
-        let response = combo.show_ui(ui, |ui| {
-            for n in GRASPS {
-                if ui.selectable_label(n == now, name(n)).clicked() {
-                    cx.push(Command::Evaluate(EvaluateCommand::Grasps(n)));
-                }
+        match cx.state.tasks.of_kind(TaskKind::Evaluate) {
+            Some((_, task)) => {
+                let now = &task.progress;
+                let text = match now.fraction() {
+                    Some(_) => format!("{} of {} pairs   {}", now.done, now.total, now.text),
+                    None => now.text.clone(),
+                };
+                cx.under_way(ui, task, &text);
             }
-        });
-        let tip = "Spread evenly over the grasps of each tool. Default: all; a few give a quick look. Each generator uses its own default steps and seed; `evaluate --steps N --seed N` sets the same for all";
-        response.response.accessible_name("Grasps per tool").on_hover_text(tip);
+            // The empty table offers it large.
+            None if cx.state.table.result.is_some() => _ = cx.action_button(ui, Action::PredictAll, "Predict all"),
+            None => {}
+        }
+        if cx.state.table.result.is_none() {
+            return;
+        }
         let mut published = cx.state.table.published;
         let tip =
             "Adds the numbers published on real data, by the paper and the lab; not directly comparable with yours";
         if ui.checkbox(&mut published, "published rows").on_hover_text(tip).changed() {
             cx.push(Command::Evaluate(EvaluateCommand::Published(published)));
         }
-        match cx.state.tasks.of_kind(TaskKind::Evaluate) {
-            Some((_, task)) => {
-                let now = &task.progress;
-                let text = match now.fraction() {
-                    Some(_) => format!("{} of {} grasps   {}", now.done, now.total, now.text),
-                    None => now.text.clone(),
-                };
-                cx.under_way(ui, task, &text);
-            }
-            None => {
-                // The empty table offers it large; an export is in the pane's menu.
-                if cx.state.table.result.is_some() {
-                    cx.action_button(ui, Action::EvaluateDataset, "Evaluate");
-                }
-            }
-        }
+        ui.checkbox(&mut memory.more, "more columns").on_hover_text("Shows every column that has numbers");
     });
 }
 
-/// The column groups, one below the other.
-fn table(cx: &Cx<'_>, ui: &mut Ui, rows: &[Row]) {
-    let Some(result) = &cx.state.table.result else { return };
-    let all = columns(rows);
-    ui.label(RichText::new(result.size()).color(cx.p.strong));
-    ScrollArea::vertical().auto_shrink(false).id_salt("results").show(ui, |ui| {
-        ui.spacing_mut().item_spacing.y = 0.0;
-        let mut groups: Vec<Group> = result.groups.clone();
-        groups.sort_unstable();
-        for group in groups {
-            let figures: Vec<(&Row, &TableMetrics)> =
-                rows.iter().filter_map(|r| Some((r, r.groups.iter().find(|f| f.group == group)?))).collect();
-            heading(cx, ui, group, &all);
-            let best = Best::of(&all, &figures);
-            for (row, figures) in figures {
-                line(cx, ui, row, figures, &all, &best);
-            }
-            ui.add_space(10.0);
-        }
-        ui.spacing_mut().item_spacing.y = 2.0;
-        let mut notes = vec![result.conventions.to_owned()];
-        notes.extend(result.notes.iter().cloned());
-        if !result.complete {
-            ui.label(RichText::new("Stopped early: not all grasps are scored").size(SMALL).color(cx.p.caution));
-        }
-        for note in notes {
-            ui.add(egui::Label::new(caption(note, cx.p)).wrap());
-        }
-    });
+/// Cells of pair, tool and figures.
+fn cells(rect: Rect, numbers: usize) -> ([Rect; 2], Vec<Rect>) {
+    let cell = |left: f32, width: f32| Rect::from_min_size(pos2(left, rect.top()), vec2(width, rect.height()));
+    let [pair, tool] = NAMES;
+    let start = rect.left() + pair + tool;
+    let width = ((rect.right() - start) / numbers.max(1) as f32).max(0.0);
+    let names = [cell(rect.left(), pair), cell(rect.left() + pair, tool)];
+    (names, (0..numbers).map(|index| cell(start + index as f32 * width, width)).collect())
 }
 
-/// Cells of the method's name and of the figures, the number of grasps first: as wide as their headings ask for.
-fn cells(rect: Rect, shown: &[&Column]) -> (Rect, Vec<Rect>) {
-    let letters = |text: &str| text.chars().count().max(6) as f32 + 1.0;
-    let shares: Vec<f32> = std::iter::once("grasps").chain(shown.iter().map(|c| c.heading)).map(letters).collect();
-    let unit = rect.width() / (NAME + shares.iter().sum::<f32>());
-    let name = Rect::from_min_size(rect.min, vec2(unit * NAME, rect.height()));
-    let mut left = name.right();
-    let mut number = |share: f32| {
-        let cell = Rect::from_min_size(pos2(left, rect.top()), vec2(unit * share, rect.height()));
-        left = cell.right();
-        cell
-    };
-    (name, shares.into_iter().map(&mut number).collect())
-}
-
-fn heading(cx: &Cx<'_>, ui: &mut Ui, group: Group, shown: &[&Column]) {
-    ui.label(section(group.label(), cx.p));
+/// The names of the columns; a click sorts by one.
+fn head(cx: &mut Cx<'_>, ui: &mut Ui, shown: &[&Column]) {
+    let p = cx.p;
     let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::hover());
-    ui.painter().hline(rect.x_range(), rect.bottom(), (1.0, cx.p.line));
-    let (name, numbers) = cells(rect, shown);
+    ui.painter().hline(rect.x_range(), rect.bottom(), (1.0, p.line));
+    let (names, numbers) = cells(rect, shown.len());
     let font = FontId::new(SMALL, medium());
-    let left = pos2(name.left() + 4.0, name.center().y);
-    ui.painter_at(name).text(left, Align2::LEFT_CENTER, "Method", font.clone(), cx.p.weak);
-    let grasps = ("grasps", "Grasps that were scored");
-    let texts = std::iter::once(grasps).chain(shown.iter().map(|c| (c.heading, c.tip)));
-    for (column, ((text, tip), cell)) in texts.zip(numbers).enumerate() {
-        let right = pos2(cell.right() - 6.0, cell.center().y);
-        ui.painter_at(cell).text(right, Align2::RIGHT_CENTER, text, font.clone(), cx.p.weak);
-        ui.interact(cell, ui.scope_id().with((group.label(), column)), Sense::hover()).on_hover_text(tip);
+    for (cell, (name, sort)) in names.iter().zip([("Pair", Sort::Natural), ("Tool", Sort::Tool)]) {
+        let response = ui.interact(*cell, ui.scope_id().with(name), Sense::click());
+        response.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("Sort by {name}")));
+        let color = if cx.state.library.sort == sort || response.hovered() { p.strong } else { p.weak };
+        let left = pos2(cell.left() + 6.0, cell.center().y);
+        ui.painter_at(*cell).text(left, Align2::LEFT_CENTER, name, font.clone(), color);
+        if response.on_hover_text("Sorts the list").clicked() {
+            cx.push(LibraryCommand::SetSort(sort));
+        }
+    }
+    let by = cx.state.table.by().filter(|_| cx.state.library.sort == Sort::Score).map(|(_, metric)| metric);
+    let chosen = cx.state.table.chosen.clone();
+    for (column, cell) in shown.iter().zip(numbers) {
+        let metric = column.metric();
+        let sorted = metric.is_some() && by == metric;
+        let sense = if metric.is_some() { Sense::click() } else { Sense::hover() };
+        let response = ui.interact(cell, ui.scope_id().with(column.key), sense);
+        let text = if metric == Some(Metric::Verdict) { "verdict" } else { column.heading };
+        let name = metric.map_or(text.to_owned(), |metric| format!("Sort by {}", metric.name()));
+        response.widget_info(|| WidgetInfo::labeled(Role::Button, metric.is_some(), &name));
+        let color = if sorted || metric.is_some() && response.hovered() { p.strong } else { p.weak };
+        let right = pos2(cell.right() - 14.0, cell.center().y);
+        let place = ui.painter_at(cell).text(right, Align2::RIGHT_CENTER, text, font.clone(), color);
+        if sorted {
+            // Down: from bad to good.
+            let c = pos2(place.right() + 7.0, cell.center().y);
+            let s = if chosen.best_first { -1.0 } else { 1.0 };
+            let points = vec![c + vec2(-3.0, -2.0 * s), c + vec2(3.0, -2.0 * s), c + vec2(0.0, 2.5 * s)];
+            ui.painter().add(Shape::convex_polygon(points, color, Stroke::NONE));
+        }
+        let sorts = if metric.is_some() { ". Click to sort, worst first; click again to reverse" } else { "" };
+        if response.on_hover_text(format!("{}{sorts}", column.tip)).clicked() {
+            let best_first = sorted && !chosen.best_first;
+            cx.push(LibraryCommand::SetScore(ScoreChoice { metric, best_first, ..chosen.clone() }));
+        }
     }
 }
 
-/// The best computed figure of each column, to be seen at a glance; the upper bound and published rows do not compete.
-struct Best(Vec<Option<f64>>);
-
-impl Best {
-    fn of(shown: &[&Column], figures: &[(&Row, &TableMetrics)]) -> Self {
-        let of = |column: &&Column| {
-            let values: Vec<f64> = figures
-                .iter()
-                .filter(|(row, _)| competes(row))
-                .filter_map(|(_, f)| Some(f.get(column)?.value))
-                .collect();
-            let pick = if column.larger_is_better { f64::max } else { f64::min };
-            (values.len() > 1).then(|| values.into_iter().reduce(pick)).flatten()
-        };
-        Self(shown.iter().map(of).collect())
-    }
+fn method_head(cx: &Cx<'_>, ui: &mut Ui, group: Group) {
+    let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::hover());
+    let left = pos2(rect.left() + 6.0, rect.center().y);
+    ui.painter_at(rect).text(left, Align2::LEFT_CENTER, group.label(), FontId::new(SMALL, medium()), cx.p.weak);
 }
 
-fn competes(row: &Row) -> bool {
-    !row.published && !row.upper_bound
+/// A name in its cell, cut in the middle.
+fn name(ui: &Ui, cell: Rect, text: &str, color: Color32) {
+    let font = FontId::proportional(12.0);
+    let width = |text: &str| ui.painter().layout_no_wrap(text.to_owned(), font.clone(), color).size().x;
+    let text = cut_in_the_middle(text, cell.width() - 10.0, width);
+    let left = pos2(cell.left() + 6.0, cell.center().y);
+    ui.painter_at(cell).text(left, Align2::LEFT_CENTER, text, font.clone(), color);
 }
 
-fn line(cx: &Cx<'_>, ui: &mut Ui, row: &Row, figures: &TableMetrics, shown: &[&Column], best: &Best) {
-    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::hover());
-    if response.hovered() {
-        ui.painter().rect_filled(rect, 3.0, cx.p.control[0]);
+fn number(ui: &Ui, cell: Rect, text: &str, color: Color32) {
+    let right = pos2(cell.right() - 14.0, cell.center().y);
+    ui.painter_at(cell).text(right, Align2::RIGHT_CENTER, text, FontId::proportional(12.0), color);
+}
+
+/// A row that can be chosen: its place, and whether it was clicked.
+fn row(cx: &Cx<'_>, ui: &mut Ui, label: &str, selected: bool, tip: &str) -> (Rect, bool) {
+    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::click());
+    response.widget_info(|| WidgetInfo::selected(Role::Button, true, selected, label));
+    let fill = match (selected, response.hovered()) {
+        (true, _) => cx.p.selected,
+        (false, true) => cx.p.control[0],
+        (false, false) => Color32::TRANSPARENT,
+    };
+    ui.painter().rect_filled(rect, 3.0, fill);
+    (rect, response.on_hover_text(tip).clicked())
+}
+
+/// The means of a method over the pairs of a group; a click has the pairs below show its scores.
+fn method(cx: &mut Cx<'_>, ui: &mut Ui, of: &Row, figures: &TableMetrics, shown: &[&Column]) {
+    let source = cx.state.table.scores.sources.iter().find(|source| *source.name == *of.method);
+    let chosen = cx.state.table.by().is_some_and(|(by, _)| *by.name == *of.method);
+    let label = format!("{}: {} grasps, {} images", of.method, figures.grasps, figures.images);
+    let mut tip = label.clone();
+    for (column, e) in shown.iter().filter_map(|c| Some((c, figures.get(c)?))) {
+        if let Some([low, high]) = e.interval {
+            tip += &format!("\n{} {:.3$} to {:.3$} (95 % CI)", column.heading, low, high, column.decimals);
+        }
     }
-    let (name, numbers) = cells(rect, shown);
-    let color = match (row.upper_bound, row.published) {
+    if figures.without_pose > 0 {
+        tip += &format!("\n{} grasps without a pose", figures.without_pose);
+    }
+    tip += if of.published { "\nPublished, on real data" } else { "\nClick: the pairs below show its scores" };
+    let next = source.map(|source| ScoreChoice { source: Some(source.name.clone()), ..cx.state.table.chosen.clone() });
+    let (rect, clicked) = row(cx, ui, &label, chosen, &tip);
+    if let Some(next) = next.filter(|_| clicked) {
+        cx.push(LibraryCommand::SetScore(next));
+    }
+    let ([pair, tool], numbers) = cells(rect, shown.len());
+    let color = match (of.upper_bound, of.published) {
         (true, _) => cx.p.truth,
         (_, true) => cx.p.weak,
         _ => cx.p.prediction,
     };
-    let font = FontId::proportional(12.0);
-    let left = pos2(name.left() + 4.0, name.center().y);
-    let galley = ui.painter().layout_job(egui::text::LayoutJob {
-        wrap: egui::text::TextWrapping::truncate_at_width(name.width() - 8.0),
-        ..egui::text::LayoutJob::single_section(row.method.clone(), egui::TextFormat::simple(font.clone(), color))
-    });
-    let top = left - vec2(0.0, 0.5 * galley.size().y);
-    ui.painter().galley(top, galley, color);
-    let put = |cell: Rect, text: &str, color: Color32| {
-        let right = pos2(cell.right() - 6.0, cell.center().y);
-        ui.painter_at(cell).text(right, Align2::RIGHT_CENTER, text, font.clone(), color);
-    };
-    put(numbers[0], &figures.grasps.to_string(), cx.p.weak);
-    for ((column, cell), best) in shown.iter().zip(&numbers[1..]).zip(&best.0) {
-        let Some(e) = figures.get(column) else {
-            put(*cell, "–", cx.p.weak);
-            continue;
-        };
-        let is_best = competes(row) && best.is_some_and(|b| b == e.value);
-        let color = match (row.published, is_best) {
-            (true, _) => cx.p.weak,
-            (false, true) => cx.p.good,
-            (false, false) => cx.p.strong,
-        };
-        put(*cell, &format!("{:.1$}", e.value, column.decimals), color);
-    }
-    let mut said = format!("{}: {} grasps, {} images", row.method, figures.grasps, figures.images);
-    for (column, e) in shown.iter().filter_map(|c| Some((c, figures.get(c)?))) {
-        let decimals = column.decimals;
-        said += &format!("\n{} {:.decimals$}", column.heading, e.value);
-        if let Some([low, high]) = e.interval {
-            said += &format!("   (95 % CI {low:.decimals$} to {high:.decimals$})");
+    name(ui, pair.union(tool), &of.method, color);
+    for (column, cell) in shown.iter().zip(numbers) {
+        let unit = if column.metric() == Some(Metric::Verdict) { " % good" } else { "" };
+        match figures.get(column) {
+            Some(e) => number(ui, cell, &format!("{:.1$}{unit}", e.value, column.decimals), cx.p.strong),
+            None => number(ui, cell, "–", cx.p.weak),
         }
     }
-    if figures.without_pose > 0 {
-        said += &format!("\n{} grasps without a pose", figures.without_pose);
+}
+
+/// The scores of a pair.
+fn pair_row(cx: &mut Cx<'_>, ui: &mut Ui, pair: PairId, shown: &[&Column]) {
+    let Some(entry) = cx.state.library.entry(pair) else { return };
+    let selected = cx.state.selection.pair == Some(pair);
+    let (rect, clicked) =
+        row(cx, ui, &format!("Row {}", entry.name), selected, &format!("{}. Click to show it", entry.name));
+    let (names, numbers) = cells(rect, shown.len());
+    let tool = entry.tool.as_deref().unwrap_or("");
+    name(ui, names[0], short_name(entry), cx.p.strong);
+    name(ui, names[1], &tool.strip_prefix("pattern_").unwrap_or(tool).replace('_', " "), cx.p.text);
+    let source = cx.state.table.by().map(|(source, _)| source);
+    for (column, cell) in shown.iter().zip(numbers) {
+        match source.and_then(|source| figure(cx, source, pair, column)) {
+            Some((text, color)) => number(ui, cell, &text, color),
+            None => number(ui, cell, "–", cx.p.weak),
+        }
     }
-    if row.published {
-        said += "\nPublished, on real data";
+    if clicked {
+        cx.push(LibraryCommand::Select(pair));
     }
-    response.widget_info(|| WidgetInfo::labeled(Role::Row, true, said.lines().next().unwrap_or_default()));
-    response.on_hover_text(said);
+}
+
+/// A pair's figure in words, with its color.
+fn figure(cx: &Cx<'_>, source: &SourceScores, pair: PairId, column: &Column) -> Option<(String, Color32)> {
+    let grasp = source.grasp(pair)?;
+    if let Some(metric) = column.metric() {
+        let value = grasp.metric(metric)?;
+        let text = match metric {
+            Metric::Verdict => metric.text(value),
+            _ if value.is_nan() => metric.text(value),
+            _ => format!("{:.*}", metric.decimals(), metric.shown(value)),
+        };
+        return Some((text, score_color(cx.p, metric, value)));
+    }
+    let value = column.of_grasp(grasp)?;
+    let text = match column.heading.ends_with('%') {
+        true if value > 0.0 => "yes".to_owned(),
+        true => "no".to_owned(),
+        false => format!("{value:.*}", column.decimals),
+    };
+    Some((text, cx.p.text))
 }

@@ -6,8 +6,8 @@ mod gizmo;
 mod hands;
 mod layers;
 mod legend;
-mod measure;
 mod overlay;
+mod pick;
 mod steps;
 mod strip;
 mod verdict;
@@ -23,7 +23,6 @@ use layers::LayerColors;
 use steps::StepLines;
 
 use super::images;
-use crate::app::action::Action;
 use crate::app::command::{CameraPreset, Command, Hover, Pane, ViewCommand};
 use crate::app::keys::{DatasetSeq, ImprintSource};
 use crate::app::results;
@@ -71,23 +70,19 @@ pub(crate) struct Memory {
     drawing: Option<ImprintSource>,
     /// The CAD model on the device.
     mesh: Option<SceneMesh>,
-    /// Correspondences of the step that the time machine shows.
+    /// Lines of the step that is shown.
     step_lines: Option<StepLines>,
-    /// The pass in which a camera was last moved, and whose.
-    moved: Option<(u64, ImprintSource)>,
+    /// The pass in which a camera was last moved.
+    moved: Option<u64>,
     /// Counts what was made for the renderer.
     revision: u64,
-    /// The side whose view is under the pointer.
-    pub hovered: Option<ImprintSource>,
-    /// True where the legend is unfolded.
-    legend_open: bool,
 }
 
 impl Memory {
-    /// Turns the cameras of all sides, or of `only` one.
-    pub(crate) fn look_from(&mut self, only: Option<ImprintSource>, preset: CameraPreset) {
-        for source in ImprintSource::iter().filter(|source| only.is_none_or(|only| only == *source)) {
-            self.views[source as usize].camera.look_from(match preset {
+    /// Turns the cameras of both sides.
+    pub(crate) fn look_from(&mut self, preset: CameraPreset) {
+        for view in &mut self.views {
+            view.camera.look_from(match preset {
                 CameraPreset::Left => Preset::Left,
                 CameraPreset::Right => Preset::Right,
                 CameraPreset::Front => Preset::Front,
@@ -109,7 +104,7 @@ impl Memory {
     /// The cameras of both sides as text; empty where a view was not placed yet.
     pub(crate) fn cameras(&self) -> [String; 2] {
         [ImprintSource::Measured, ImprintSource::Predicted].map(|side| match self.views[side as usize].placed {
-            true => self.camera_text(side),
+            true => serde_json::to_string(&self.views[side as usize].camera).unwrap_or_default(),
             false => String::new(),
         })
     }
@@ -123,11 +118,6 @@ impl Memory {
                 view.placed = true;
             }
         }
-    }
-
-    /// The camera of a side, as text for the clipboard.
-    pub(crate) fn camera_text(&self, source: ImprintSource) -> String {
-        serde_json::to_string(&self.views[source as usize].camera).unwrap_or_default()
     }
 
     /// Follows the pen no further; whether it was drawing.
@@ -169,7 +159,6 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
         let mut ui = ui.new_child(UiBuilder::new().max_rect(bar.shrink2(vec2(4.0, 2.0))).id_salt("window"));
         window::bar(cx, &mut ui);
     }
-    memory.hovered = None;
     let sides = sides_shown(cx.state);
     // The pose in hand stands below the pictures, not on them, and has the width of all.
     let in_hand = sides.iter().copied().find(|side| hands::strip_height(cx.state, *side) > 0.0);
@@ -243,7 +232,7 @@ fn one_side(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, source: ImprintSo
         ImprintSource::Measured => "3D view, measured",
         ImprintSource::Predicted => "3D view, predicted",
     };
-    verdict::line(cx, ui, source);
+    verdict::line(cx, ui, source, first);
     let held = match (draw::is_ready(state), memory.drawing == Some(source)) {
         (true, true) => Grip::Stroke,
         (true, false) => Grip::Pen,
@@ -253,24 +242,20 @@ fn one_side(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, source: ImprintSo
     let (picture, made) = made_with::split(cx, ui.available_rect_before_wrap(), source == ImprintSource::Predicted);
     let builder = UiBuilder::new().max_rect(picture);
     let output = ui.scope_builder(builder, |ui| memory.views[source as usize].interact(ui, label, held)).inner;
-    if output.pointer.is_some() {
-        memory.hovered = Some(source);
-        if state.workbench.side != source && memory.gizmo.is_free() {
-            cx.push(Command::Workbench(WorkbenchCommand::SetSide(source)));
-        }
+    if output.pointer.is_some() && state.workbench.side != source && memory.gizmo.is_free() {
+        cx.push(Command::Workbench(WorkbenchCommand::SetSide(source)));
     }
     let mut scene = build::scene_of(cx, memory, source);
-    place_camera(cx, ui, memory, source, &output, &scene);
+    place_camera(cx, memory, source, &output, &scene);
     let camera = memory.views[source as usize].camera;
     cx.shared.angles[source as usize] =
         ViewAngles { yaw_deg: camera.yaw_rad.to_degrees(), pitch_deg: camera.pitch_rad.to_degrees() };
-    // A linked camera may be drawn before the one that leads it: it moves in the next frame.
+    // A camera may be drawn before the one that leads it: it moves in the next frame.
     let pass = ui.ctx().cumulative_pass_nr();
     if output.moved {
-        memory.moved = Some((pass, source));
+        memory.moved = Some(pass);
     }
-    let linked = state.settings.cameras_linked;
-    scene.moving = memory.moved.is_some_and(|(last_pass, by)| pass <= last_pass + 1 && (by == source || linked));
+    scene.moving = memory.moved.is_some_and(|last_pass| pass <= last_pass + 1);
     if scene.moving {
         // Moving views are drawn coarsely: draw all there is once they rest.
         ui.ctx().request_repaint_after(std::time::Duration::from_millis(120));
@@ -284,39 +269,22 @@ fn one_side(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, source: ImprintSo
         made_with::show(cx, ui, label, picture, below);
     }
     if let Lookup::Ready(clouds) = lookup {
-        pick(cx, ui, memory, source, &output, clouds);
-        measure::click(cx, memory, source, &output, clouds);
+        point_at(cx, ui, memory, source, &output, clouds);
+        pick::click(cx, memory, source, &output, clouds);
     }
     overlay::show(cx, ui, memory, source, &output, first);
     let rect = output.response.rect;
-    measure::marks(cx, ui, memory, source, &output);
     gizmo::show(cx, ui, memory, source, &output);
     if let Some(clouds) = lookup.shown() {
         draw::show(cx, ui, memory, source, &output, clouds);
     }
     if let Lookup::Ready(clouds) = lookup {
-        measure::card(cx, ui, source, rect, clouds);
+        pick::card(cx, ui, source, rect, clouds);
     }
 }
 
-/// Moves the camera of a side to where it was pasted, aimed or fitted to; a linked one follows.
-fn place_camera(
-    cx: &mut Cx<'_>,
-    ui: &Ui,
-    memory: &mut Memory,
-    source: ImprintSource,
-    output: &SceneOutput,
-    scene: &SceneData,
-) {
-    let pasted = pasted(ui, output);
-    if let Some(camera) = pasted {
-        let orthographic = memory.views[source as usize].camera.orthographic;
-        memory.views[source as usize].camera = Camera { orthographic, ..camera };
-        memory.views[source as usize].placed = true;
-        if camera.orthographic != orthographic {
-            cx.act(Action::Parallel);
-        }
-    }
+/// Moves the camera of a side to where it was aimed or fitted to; the other one follows.
+fn place_camera(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource, output: &SceneOutput, scene: &SceneData) {
     let aimed = match (output.fit, output.pointer, results::cloud(cx.state, source)) {
         (true, Some(pointer), Lookup::Ready(clouds)) => aim(memory, source, output, pointer, clouds),
         _ => false,
@@ -328,7 +296,7 @@ fn place_camera(
         // Until the model stands where it belongs, what is shown is not yet what is to be looked at.
         view.placed = !matches!(results::pose(cx.state, source), Lookup::Waiting | Lookup::Stale(_));
     }
-    if (output.moved || place || aimed || pasted.is_some()) && cx.state.settings.cameras_linked {
+    if output.moved || place || aimed {
         let camera = memory.views[source as usize].camera;
         let placed = memory.views[source as usize].placed && memory.clouds[1 - source as usize].is_some();
         let other = &mut memory.views[1 - source as usize];
@@ -353,17 +321,6 @@ fn update(cx: &mut Cx<'_>, memory: &mut Memory, source: ImprintSource) {
     build::update_mesh(cx, &mut memory.mesh, &mut memory.revision);
     layers::update(cx, memory, source);
     steps::update(cx, memory, source);
-}
-
-/// A camera that was pasted over a view.
-fn pasted(ui: &Ui, output: &SceneOutput) -> Option<Camera> {
-    output.pointer?;
-    ui.input(|i| {
-        i.events.iter().find_map(|event| match event {
-            egui::Event::Paste(text) => serde_json::from_str::<Camera>(text).ok().filter(Camera::is_valid),
-            _ => None,
-        })
-    })
 }
 
 /// Centers a view on the point under the pointer; whether there is one.
@@ -399,7 +356,7 @@ fn nearest(clouds: &Clouds, camera: &Camera, size: [u32; 2], pointer: glam::DVec
 }
 
 /// The point under the pointer becomes the pixel under the pointer of all images.
-fn pick(cx: &mut Cx<'_>, ui: &Ui, memory: &Memory, source: ImprintSource, output: &SceneOutput, clouds: &Clouds) {
+fn point_at(cx: &mut Cx<'_>, ui: &Ui, memory: &Memory, source: ImprintSource, output: &SceneOutput, clouds: &Clouds) {
     let Some(pointer) = output.pointer else { return };
     if ui.input(|i| i.pointer.delta() == egui::Vec2::ZERO) || output.moved {
         // At rest, or while the view turns, the mark stays where it is.

@@ -6,7 +6,7 @@ use strum::IntoEnumIterator as _;
 
 use crate::app::action::Action;
 use crate::app::command::Pane;
-use crate::app::settings::{ColorMap, MAX_CACHE_MIB, Theme};
+use crate::app::settings::{ColorMap, MAX_CACHE_MIB};
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{caption, section};
 use touch2touch_pipeline::infer::engine::EngineChoice;
@@ -41,11 +41,6 @@ fn body(cx: &mut Cx<'_>, ui: &mut Ui) {
     let settings = &cx.state.settings;
     ui.label(section("Window", cx.p));
     ui.horizontal(|ui| {
-        for (theme, name) in [(Theme::Dark, "Dark"), (Theme::Light, "Light")] {
-            if ui.radio(settings.theme == theme, name).on_hover_text("Colors of the window").clicked() {
-                cx.out.push(prefer(move |s| s.theme = theme).into());
-            }
-        }
         let mut zoom = settings.ui_zoom;
         let drag = egui::DragValue::new(&mut zoom).speed(0.01).range(0.5..=4.0).fixed_decimals(2).prefix("zoom ");
         // The whole window is scaled: while the number is dragged the pointer must not slip off it.
@@ -64,22 +59,6 @@ fn body(cx: &mut Cx<'_>, ui: &mut Ui) {
             }
         }
     });
-    let mut footprint = settings.footprint_visible;
-    if ui
-        .checkbox(&mut footprint, "GelSlim window on bubble images")
-        .on_hover_text(Action::Footprint.tooltip())
-        .changed()
-    {
-        cx.out.push(prefer(move |s| s.footprint_visible = footprint).into());
-    }
-    let mut mask = settings.mask_visible;
-    if ui.checkbox(&mut mask, "Contact mask on imprints").on_hover_text(Action::MaskVisible.help()).changed() {
-        cx.out.push(prefer(move |s| s.mask_visible = mask).into());
-    }
-    let mut linked = settings.cameras_linked;
-    if ui.checkbox(&mut linked, "3D views move together").on_hover_text(Action::LinkCameras.tooltip()).changed() {
-        cx.out.push(prefer(move |s| s.cameras_linked = linked).into());
-    }
     ui.label(section("Models", cx.p));
     ui.horizontal(|ui| {
         ui.label(RichText::new("Engine").color(cx.p.weak));

@@ -14,7 +14,7 @@ use crate::app::action::Action;
 use crate::app::command::Command;
 use crate::app::keys::ImprintSource;
 use crate::app::state::State;
-use crate::app::state::tasks::Task;
+use crate::app::state::tasks::RunningTask;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::SensorKind;
 use touch2touch_pipeline::still::space::ViewAngles;
@@ -88,7 +88,7 @@ impl Cx<'_> {
     }
 
     /// The progress of a task in a pane, in the words of `text`; the bar below has the one that fills, and Cancel.
-    pub(crate) fn under_way(&self, ui: &mut Ui, task: &Task, text: &str) {
+    pub(crate) fn under_way(&self, ui: &mut Ui, task: &RunningTask, text: &str) {
         let text = match (task.cancelling, text) {
             (true, _) => "stopping…",
             (false, "") => "starting…",
@@ -107,14 +107,12 @@ pub(crate) struct Views {
     pub bubble: ViewTransform,
     /// Half the range of the error's colors, millimeters.
     pub error_mm: f32,
-    /// Counts how often bubble images were fitted: a 3D view beside them follows.
-    pub fits: u64,
 }
 
 impl Default for Views {
     fn default() -> Self {
         let view = ViewTransform::default();
-        Self { gel: view, bubble: view, error_mm: 4.0, fits: 0 }
+        Self { gel: view, bubble: view, error_mm: 4.0 }
     }
 }
 
@@ -126,7 +124,6 @@ impl Views {
         }
         if only != Some(SensorKind::Color) {
             self.bubble = ViewTransform::default();
-            self.fits += 1;
         }
     }
 

@@ -18,8 +18,6 @@ const NEVER_SHOWN: Duration = Duration::from_millis(700);
 pub(crate) enum Purpose {
     /// A folder with pairs, to open.
     Folder,
-    /// A file, whose folder is opened.
-    File,
     /// The folder that the results table is written to.
     Table,
     /// The folder of masks that are imported.
@@ -37,8 +35,8 @@ impl Purpose {
         let writes_file = matches!(self, Self::Output(output) if output.file_name().is_some());
         let (named, shown) = (path.to_str().and_then(BuiltIn::named), path.display());
         match self {
-            Self::Folder | Self::File if named.is_some() => None,
-            Self::Folder | Self::File | Self::Masks => (!path.exists()).then(|| format!("There is nothing at {shown}")),
+            Self::Folder if named.is_some() => None,
+            Self::Folder | Self::Masks => (!path.exists()).then(|| format!("There is nothing at {shown}")),
             _ if writes_file && path.is_dir() => Some(format!("{shown} is a folder: name a file in it")),
             _ if writes_file => parent
                 .filter(|parent| !parent.is_dir())
@@ -50,7 +48,6 @@ impl Purpose {
     fn title(self) -> &'static str {
         match self {
             Self::Folder => "Open a folder of pairs",
-            Self::File => "Open a file of a data set",
             Self::Output(output) => output.title(),
             Self::Labels => "Save the labels to a folder",
             Self::Masks => "Import masks from a folder",
@@ -109,7 +106,6 @@ impl Dialogs {
             let path = match purpose {
                 _ if !possible => None,
                 Purpose::Folder | Purpose::Table | Purpose::Masks | Purpose::Labels => dialog.pick_folder(),
-                Purpose::File => dialog.pick_file(),
                 Purpose::Output(output) => match output.file_name() {
                     Some(name) => dialog.set_file_name(name).save_file(),
                     None => dialog.pick_folder(),
@@ -268,7 +264,7 @@ mod tests {
             (Purpose::Folder, &new, Some("nothing at")),
             (Purpose::Folder, Path::new("test-set"), None),
             (Purpose::Masks, Path::new("test-set"), Some("nothing at")),
-            (Purpose::File, &file, None),
+            (Purpose::Folder, &file, None),
             (Purpose::Labels, &new, None),
             (Purpose::Labels, &file, Some("is a file")),
             (picture, &new, None),

@@ -25,7 +25,7 @@ pub(crate) fn is_predicted(cx: &Cx<'_>, pane: Pane) -> bool {
     match pane.kind() {
         Kind::Imprint(source) => source == ImprintSource::Predicted,
         Kind::Steps => cx.state.inspect.source == ImprintSource::Predicted,
-        Kind::Versus => cx.state.settings.compared().is_error(),
+        Kind::Compare => cx.state.settings.compared().is_error(),
         Kind::Form | Kind::Color | Kind::Scene => false,
     }
 }

@@ -41,25 +41,25 @@ pub(crate) struct Easel<'a> {
 impl Easel<'_> {
     /// True where a stroke is drawn here.
     fn has(&self, stroke: &Drawn) -> bool {
-        let here = stroke.drawing.sight.is_some() == self.in_3d && stroke.source == self.source;
-        here && (self.in_3d || stroke.place.pad == self.finger)
+        let same = stroke.drawing.sight.is_some() == self.in_3d && stroke.source == self.source;
+        same && (self.in_3d || stroke.place.pad == self.finger)
     }
 }
 
 /// Walks every pointer event of the frame: at a low frame rate one frame holds many moves, and a drawing must follow
-/// all of them. `held` is what the pen draws on now, `here` this easel's name in it. `begin` makes the command of a press at
+/// all of them. `held` is what the pen draws on now, `this` this easel's name in it. `begin` makes the command of a press at
 /// a place of the picture that removes or not, with keys held; `None` where such a press is not the pen's.
 pub(crate) fn follow<K: Copy + PartialEq>(
     cx: &mut Cx<'_>,
     ui: &Ui,
-    (held, here): (&mut Option<K>, K),
+    (held, this): (&mut Option<K>, K),
     easel: &Easel<'_>,
     begin: impl Fn([f32; 2], bool, Modifiers) -> Option<LabelsCommand>,
 ) {
     let tool = cx.state.settings.mask.tool;
     let events = ui.input(|i| i.events.clone());
     // A polygon that was given up elsewhere, by a key or by drawing there.
-    if *held == Some(here)
+    if *held == Some(this)
         && tool == MaskTool::Polygon
         && !cx.state.document.stroke.as_ref().is_some_and(|s| easel.has(s))
     {
@@ -75,13 +75,13 @@ pub(crate) fn follow<K: Copy + PartialEq>(
                 let at_px = easel.map.to_image(pos);
                 let erase = button == PointerButton::Secondary || modifiers.ctrl || modifiers.command;
                 let Some(command) = begin(at_px, erase, modifiers) else { continue };
-                if *held != Some(here) && cx.state.selection.finger != easel.finger {
+                if *held != Some(this) && cx.state.selection.finger != easel.finger {
                     // Whoever clicks beside what is worked on wants to work there: nothing is painted by it.
                     cx.push(ViewCommand::SelectFinger(easel.finger));
                 } else if held.is_none() {
-                    *held = Some(here);
+                    *held = Some(this);
                     cx.push(command);
-                } else if *held == Some(here) && tool == MaskTool::Polygon {
+                } else if *held == Some(this) && tool == MaskTool::Polygon {
                     if closes(cx, easel, pos) {
                         *held = None;
                         cx.push(LabelsCommand::Close);
@@ -91,18 +91,18 @@ pub(crate) fn follow<K: Copy + PartialEq>(
                 }
             }
             Event::Key { key: Key::Backspace, pressed: true, modifiers, .. }
-                if *held == Some(here)
+                if *held == Some(this)
                     && tool == MaskTool::Polygon
                     && modifiers.is_none()
                     && !ui.ctx().egui_wants_keyboard_input() =>
             {
                 cx.push(LabelsCommand::Undo);
             }
-            Event::PointerMoved(pos) if *held == Some(here) => {
+            Event::PointerMoved(pos) if *held == Some(this) => {
                 cx.push(LabelsCommand::StrokeTo(easel.map.to_image(pos)));
             }
             Event::PointerButton { pressed: false, .. } | Event::PointerGone
-                if *held == Some(here) && tool != MaskTool::Polygon =>
+                if *held == Some(this) && tool != MaskTool::Polygon =>
             {
                 *held = None;
                 cx.push(LabelsCommand::EndStroke);

@@ -8,7 +8,7 @@ use eframe::egui::{
 use eframe::egui_wgpu::RenderState;
 use glam::{DVec2, DVec3};
 
-use super::kept::KeptFrame;
+use super::frame_cache::FrameCache;
 use crate::gpu::pipelines::Pipelines;
 use crate::gpu::scene::{SceneData, SceneRenderer};
 use crate::gpu::target::Target;
@@ -156,7 +156,7 @@ impl SceneView {
         match self.try_draw(device, output, scene) {
             Ok((texture, drawn)) => {
                 if drawn && let Some(view) = self.drawn.as_ref().map(|drawn| drawn.target.view()) {
-                    ui.ctx().with_plugin(|kept: &mut KeptFrame| kept.show(texture, view));
+                    ui.ctx().with_plugin(|cache: &mut FrameCache| cache.show(texture, view));
                 }
                 let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
                 ui.painter().image(texture, output.rect, uv, egui::Color32::WHITE);

@@ -59,8 +59,8 @@ pub struct Palette {
     pub prediction: Color32,
     /// The CAD model.
     pub cad: Color32,
-    /// The two pinned steps of a registration.
-    pub pins: [Color32; 2],
+    /// The other one of two predictions that are compared.
+    pub second: Color32,
     /// Done.
     pub good: Color32,
     /// Needs care.
@@ -85,7 +85,7 @@ pub(crate) const DARK: Palette = Palette {
     truth: Color32::from_rgb(0x56, 0xb4, 0xe9),
     prediction: Color32::from_rgb(0xf5, 0x93, 0x3d),
     cad: Color32::from_rgb(0xa9, 0xb1, 0xad),
-    pins: [Color32::from_rgb(0xb8, 0xe0, 0x4a), Color32::from_rgb(0x4f, 0xd1, 0xc5)],
+    second: Color32::from_rgb(0xb8, 0xe0, 0x4a),
     good: Color32::from_rgb(0x4c, 0xb9, 0x7a),
     caution: Color32::from_rgb(0xe6, 0xc2, 0x40),
     wrong: Color32::from_rgb(0xf0, 0x5f, 0x5f),
@@ -107,7 +107,7 @@ pub(crate) const LIGHT: Palette = Palette {
     truth: Color32::from_rgb(0x00, 0x6f, 0xb0),
     prediction: Color32::from_rgb(0xc2, 0x54, 0x00),
     cad: Color32::from_rgb(0x6d, 0x76, 0x71),
-    pins: [Color32::from_rgb(0x5b, 0x7a, 0x00), Color32::from_rgb(0x0a, 0x7d, 0x74)],
+    second: Color32::from_rgb(0x5b, 0x7a, 0x00),
     good: Color32::from_rgb(0x1c, 0x84, 0x47),
     caution: Color32::from_rgb(0x96, 0x6f, 0x00),
     wrong: Color32::from_rgb(0xc6, 0x28, 0x28),

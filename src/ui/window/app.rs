@@ -6,7 +6,6 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::time::Instant;
 
 use eframe::egui::{self, ThemePreference, ViewportCommand};
 use egui_tiles::Tree;
@@ -26,7 +25,7 @@ use crate::app::keys::ImprintSource;
 use crate::app::library::Place;
 use crate::app::pane::{Kind, Workspace};
 use crate::app::runtime::Runtime;
-use crate::app::services::SharedServices;
+use crate::app::services::Services;
 use crate::app::settings::Last;
 use crate::app::settings::MaskTool;
 use crate::app::settings::Theme;
@@ -35,7 +34,7 @@ use crate::app::workbench::WorkbenchCommand;
 use crate::ui::panes::log as log_pane;
 use crate::ui::parts::cx::{Cx, Shared};
 use crate::ui::parts::dialogs::Purpose;
-use crate::ui::parts::kept::KeptFrame;
+use crate::ui::parts::frame_cache::FrameCache;
 use crate::ui::parts::letters;
 use crate::ui::parts::scene_view::Device;
 use crate::ui::parts::theme;
@@ -48,10 +47,10 @@ use touch2touch_pipeline::io::fonts;
 /// Options that the studio is started with.
 pub struct Options {
     /// Files and models.
-    pub services: SharedServices,
+    pub services: Arc<Services>,
     /// Path to open; `None` opens what was open last, else the demo.
     pub open: Option<PathBuf>,
-    /// Jobs run between frames on the window's own thread, one per frame, instead of on lanes of their own: the same
+    /// Jobs run between frames on the window's own thread, one per frame, instead of on workers of their own: the same
     /// input then gives the same frames (tests).
     pub inline: bool,
     /// True where the system's file dialogs are tried before the path box.
@@ -62,13 +61,13 @@ pub struct Options {
     pub screenshots: Option<PathBuf>,
     /// Loss of the graphics device: whoever opened the window asks it when the window is closed.
     pub loss: Loss,
-    /// True where every frame is painted whole even where a program draws (for measuring what [`crate::ui::parts::kept`] saves).
+    /// True where every frame is painted whole even where a program draws (for measuring what [`crate::ui::parts::frame_cache`] saves).
     pub whole_frames: bool,
 }
 
 impl Options {
     /// The usual ones.
-    pub fn new(services: SharedServices, open: Option<PathBuf>) -> Self {
+    pub fn new(services: Arc<Services>, open: Option<PathBuf>) -> Self {
         Self {
             services,
             open,
@@ -91,8 +90,6 @@ pub struct StudioApp {
     panes: Panes,
     palette: palette::Memory,
     shortcuts: shortcuts::Memory,
-    /// Time of the last frame, milliseconds.
-    frame_ms: f32,
     trees: BTreeMap<Workspace, Tree<Pane>>,
     device: Result<Device, String>,
     inline: bool,
@@ -134,7 +131,7 @@ impl StudioApp {
             log::error!("No 3D views: {why}");
         }
         if let Some(state) = cc.wgpu_render_state.as_ref().filter(|_| !options.whole_frames)
-            && let Err(error) = KeptFrame::install(&cc.egui_ctx, state)
+            && let Err(error) = FrameCache::install(&cc.egui_ctx, state)
         {
             log::error!("Every frame is painted whole: {error}");
         }
@@ -161,7 +158,6 @@ impl StudioApp {
             panes: Panes::default(),
             palette: palette::Memory::default(),
             shortcuts: shortcuts::Memory::default(),
-            frame_ms: 0.0,
             trees: BTreeMap::new(),
             device,
             inline: options.inline,
@@ -203,7 +199,7 @@ impl StudioApp {
 
     /// Pixels of the window painted so far, where only what changed is painted. For tests.
     pub fn painted(&self, ctx: &egui::Context) -> Option<u64> {
-        ctx.with_plugin(|kept: &mut KeptFrame| kept.painted())
+        ctx.with_plugin(|cache: &mut FrameCache| cache.painted())
     }
 
     /// True where nothing runs, nothing waits and nothing is to be executed.
@@ -255,7 +251,7 @@ impl StudioApp {
             self.panes.memories.browser.scrolled_to = None;
         }
         if self.inline {
-            let more = crate::app::jobs::Lane::iter().any(|lane| self.runtime.run_one(lane));
+            let more = crate::app::jobs::Worker::iter().any(|worker| self.runtime.run_one(worker));
             if more {
                 ctx.request_repaint();
             }
@@ -340,7 +336,6 @@ impl StudioApp {
     fn perform(&mut self, ctx: &egui::Context, request: UiRequest) {
         match request {
             UiRequest::PickFolder => self.shared.dialogs.open(Purpose::Folder, ctx),
-            UiRequest::PickFile => self.shared.dialogs.open(Purpose::File, ctx),
             UiRequest::PickTableFolder => self.shared.dialogs.open(Purpose::Table, ctx),
             UiRequest::PickOutput(output) => self.shared.dialogs.open(Purpose::Output(output), ctx),
             UiRequest::PickMasks => self.shared.dialogs.open(Purpose::Masks, ctx),
@@ -349,23 +344,13 @@ impl StudioApp {
                 self.leaving = true;
                 ctx.send_viewport_cmd(ViewportCommand::Close);
             }
-            UiRequest::Camera(preset) => {
-                // The view under the pointer turns; linked cameras turn together.
-                let over = self.panes.hovered.filter(|pane| pane.kind() == Kind::Scene);
-                let side = over.and(self.panes.memories.scene.hovered);
-                let only = side.filter(|_| !self.state.settings.cameras_linked);
-                self.panes.memories.scene.look_from(only, preset);
-            }
-            UiRequest::CopyCamera => {
-                let over = self.panes.memories.scene.hovered;
-                ctx.copy_text(self.panes.memories.scene.camera_text(over.unwrap_or_default()));
-            }
+            UiRequest::Camera(preset) => self.panes.memories.scene.look_from(preset),
             UiRequest::Fit => {
                 let memories = &mut self.panes.memories;
                 match self.panes.hovered.map(Pane::kind) {
                     Some(Kind::Scene) => memories.scene.fit(),
                     Some(Kind::Color) => self.shared.views.fit(Some(SensorKind::Color)),
-                    Some(Kind::Imprint(_) | Kind::Versus) => self.shared.views.fit(Some(SensorKind::Depth)),
+                    Some(Kind::Imprint(_) | Kind::Compare) => self.shared.views.fit(Some(SensorKind::Depth)),
                     _ => {
                         self.shared.views.fit(None);
                         memories.scene.fit();
@@ -374,13 +359,11 @@ impl StudioApp {
             }
             UiRequest::ShowPane(pane) => self.show_pane(pane),
             UiRequest::Screenshot => self.shoot(ctx, None, false),
-            UiRequest::PanePicture { copied } => {
-                let part = self.panes.hovered.and_then(|pane| self.panes.places.get(&pane).copied());
-                self.shoot(ctx, part, copied);
-            }
-            UiRequest::PictureOf { pane, copied } => {
-                if let Some(place) = self.panes.places.get(&pane).copied() {
-                    self.shoot(ctx, Some(place), copied);
+            UiRequest::PanePicture { pane, copied } => {
+                let place = pane.or(self.panes.hovered).and_then(|pane| self.panes.places.get(&pane).copied());
+                // Of no pane it is the whole window, unless that pane was asked for.
+                if place.is_some() || pane.is_none() {
+                    self.shoot(ctx, place, copied);
                 }
             }
             UiRequest::ToggleFullscreen => {
@@ -494,7 +477,6 @@ impl eframe::App for StudioApp {
     }
 
     fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
-        let started = Instant::now();
         let ctx = ui.ctx().clone();
         self.outside(&ctx);
         self.shared.textures.begin_frame();
@@ -544,8 +526,7 @@ impl eframe::App for StudioApp {
             }
             edited = bars::top(&mut cx, ui, &mut tree);
             // Drawn before the panes, so it shows the read-out of the frame before: at rest they are the same.
-            bars::bottom(&mut cx, ui, self.frame_ms);
-            log_pane::notices(&mut cx, ui);
+            bars::bottom(&mut cx, ui);
             readout = cx.shared.readout.take();
             let frame = egui::Frame::new().fill(cx.p.frame);
             egui::CentralPanel::default().frame(frame).show(ui, |ui| match self.panes.maximized {
@@ -558,17 +539,18 @@ impl eframe::App for StudioApp {
                     layout::restore_collapsed(&mut tree, hidden);
                 }
             });
+            log_pane::notices(&mut cx, &ctx);
             bars::hint(&mut cx, &ctx);
             doctor::panel(&mut cx, &ctx);
             export::masks::form(&mut cx, &ctx);
             export::import::form(&mut cx, &ctx);
             palette::show(&mut cx, &ctx, &mut self.palette);
-            shortcuts::sheet(&mut cx, &ctx, &mut self.shortcuts);
+            shortcuts::list(&mut cx, &ctx, &mut self.shortcuts);
             unsaved::question(&mut cx, &ctx);
             bars::drop_overlay(&cx, &ctx);
             if let Some((purpose, path)) = cx.shared.dialogs.show(&ctx) {
                 cx.push(match purpose {
-                    Purpose::Folder | Purpose::File => Command::Library(LibraryCommand::Open(Place::Path(path))),
+                    Purpose::Folder => Command::Library(LibraryCommand::Open(Place::Path(path))),
                     Purpose::Output(output) => Command::Export(ExportCommand::Write(output, path)),
                     Purpose::Labels => Command::Labels(LabelsCommand::Unsaved(UnsavedCommand::Elsewhere(path))),
                     Purpose::Masks => Command::Export(ExportCommand::AskImport(Some(path))),
@@ -585,7 +567,6 @@ impl eframe::App for StudioApp {
         if !self.inbox.is_empty() {
             ctx.request_repaint();
         }
-        self.frame_ms = started.elapsed().as_secs_f32() * 1e3;
     }
 
     fn on_exit(&mut self) {

@@ -1,7 +1,6 @@
 //! The bar at the top (workspaces, search, theme, help) and the one at the bottom (finger, read-out, jobs).
 
 use crate::app::pane::Workspace;
-use crate::app::results;
 use crate::app::settings::prefer;
 use eframe::egui::{self, Align, Layout, Panel, RichText, Sense, Stroke, Ui, pos2, vec2};
 use egui_tiles::Tree;
@@ -11,7 +10,7 @@ use crate::app::action::{Action, with_keys};
 use crate::app::command::{LibraryCommand, Pane, TasksCommand, ViewCommand};
 use crate::app::library::Place;
 use crate::app::settings::Theme;
-use crate::app::tasks::{Task, Ticket};
+use crate::app::tasks::{RunningTask, Ticket};
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::dialogs::Purpose;
 use crate::ui::parts::theme::{SMALL, caption, medium};
@@ -164,8 +163,8 @@ fn tab(cx: &mut Cx<'_>, ui: &mut Ui, workspace: Workspace) {
     }
 }
 
-/// The bar at the bottom. `frame_ms`: time of the last frame, milliseconds.
-pub(crate) fn bottom(cx: &mut Cx<'_>, ui: &mut Ui, frame_ms: f32) {
+/// The bar at the bottom.
+pub(crate) fn bottom(cx: &mut Cx<'_>, ui: &mut Ui) {
     let frame = egui::Frame::new().fill(cx.p.frame).inner_margin(egui::Margin::symmetric(12, 2));
     Panel::bottom("bottom").frame(frame).exact_size(28.0).resizable(false).show(ui, |ui| {
         ui.horizontal_centered(|ui| {
@@ -173,7 +172,6 @@ pub(crate) fn bottom(cx: &mut Cx<'_>, ui: &mut Ui, frame_ms: f32) {
             fingers(cx, ui);
             ui.add_space(12.0);
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                frame_time(cx, ui, frame_ms);
                 following(cx, ui);
                 jobs(cx, ui);
                 ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
@@ -234,7 +232,7 @@ fn jobs(cx: &mut Cx<'_>, ui: &mut Ui) {
 }
 
 /// A running job, with its progress and a way to stop it.
-fn job(cx: &mut Cx<'_>, ui: &mut Ui, ticket: Ticket, task: &Task) {
+fn job(cx: &mut Cx<'_>, ui: &mut Ui, ticket: Ticket, task: &RunningTask) {
     let cancel = ui.add_enabled(!task.cancelling, egui::Button::new(RichText::new("Cancel").size(SMALL)));
     let cancel = cancel.accessible_name(format!("Cancel: {}", task.title));
     if cancel.on_hover_text(Action::CancelJobs.behind(task.kind.kept())).clicked() {
@@ -261,19 +259,15 @@ fn following(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.add_space(8.0);
 }
 
-/// Time of a frame, in debug builds.
-fn frame_time(cx: &Cx<'_>, ui: &mut Ui, frame_ms: f32) {
-    if cfg!(debug_assertions) && frame_ms > 0.0 {
-        ui.label(caption(format!("{:.1} ms", frame_ms), cx.p)).on_hover_text("Time of the last frame (debug)");
-        ui.add_space(8.0);
-    }
-}
-
-/// Three lines on the first start; gone for good when dismissed.
+/// What to do on the first start; gone for good when dismissed.
 pub(crate) fn hint(cx: &mut Cx<'_>, ctx: &egui::Context) {
     let demo = cx.state.library.open.as_ref().is_some_and(|open| open.place == Place::Demo);
     if cx.state.settings.hint_dismissed || !demo {
         return;
+    }
+    // Whoever has gone on to another pair needs it no longer.
+    if cx.state.selection.pair.is_some_and(|pair| cx.state.library.order.first() != Some(&pair)) {
+        return cx.push(prefer(|s| s.hint_dismissed = true));
     }
     let area = egui::Area::new(egui::Id::unique("hint")).anchor(egui::Align2::CENTER_BOTTOM, vec2(0.0, -44.0));
     area.show(ctx, |ui| {
@@ -281,18 +275,11 @@ pub(crate) fn hint(cx: &mut Cx<'_>, ctx: &egui::Context) {
             ui.set_max_width(520.0);
             ui.horizontal(|ui| {
                 ui.vertical(|ui| {
-                    let predicted = results::chosen(cx.state, cx.state.selection.finger).is_some();
-                    let first = if predicted {
-                        "This is simulated data: the predicted imprint next to the measured one."
-                    } else {
-                        "This is simulated data; the first prediction is on its way."
-                    };
+                    let first = "Simulated data: the predicted imprint next to the measured one.";
                     ui.label(RichText::new(first).color(cx.p.strong));
                     let steps = "[[next_pair]] and [[previous_pair]] step through the pairs, [[generate]] predicts the one \
-                                 on screen.";
+                                 on screen, [[palette]] finds everything else. Drop a folder here to open your own data.";
                     ui.label(with_keys(steps));
-                    let rest = "[[palette]] finds everything else. Drop a folder here to open your own data.";
-                    ui.label(with_keys(rest));
                 });
                 ui.add_space(8.0);
                 if ui.button("Got it").on_hover_text("Do not show this again").clicked() {

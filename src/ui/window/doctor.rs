@@ -27,7 +27,7 @@ const LISTED: usize = 40;
 
 /// The panel, where it is open.
 pub(crate) fn panel(cx: &mut Cx<'_>, ctx: &egui::Context) {
-    let Some(title) = cx.state.library.open.as_ref().map(|open| open.source.title().to_owned()) else { return };
+    let Some(title) = cx.state.library.open.as_ref().map(|open| open.source.dataset.title.clone()) else { return };
     if !cx.state.doctor.shown {
         return;
     }
@@ -79,7 +79,7 @@ fn facts<'a>(cx: &Cx<'a>) -> Lookup<'a, Vec<Fact>> {
 fn place(cx: &Cx<'_>, ui: &mut Ui, title: &str) {
     ui.horizontal(|ui| {
         ui.label(RichText::new(title).strong().color(cx.p.strong));
-        let root = cx.state.library.open.as_ref().and_then(|open| open.source.root());
+        let root = cx.state.library.open.as_ref().and_then(|open| open.source.dataset.root.as_deref());
         if let Some(root) = root {
             ui.add(Label::new(caption(root.display().to_string(), cx.p)).truncate());
         }

@@ -12,44 +12,29 @@ use crate::app::export::{Output, StillAsked};
 use crate::app::keys::ImprintSource;
 use crate::app::pane::Kind;
 use crate::ui::parts::cx::Cx;
-use crate::ui::parts::theme::caption;
 use touch2touch_pipeline::still::WIDTH_PX;
 use touch2touch_pipeline::still::space::Ground;
 
 /// Frames of a turntable: six seconds of a film.
 const FRAMES: u32 = 180;
 
-/// Pictures of a 3D view, by ground and size, from where the view looks now.
+/// Pictures of a 3D view from where it looks now; the verb makes them in any size.
 fn stills(cx: &mut Cx<'_>, ui: &mut Ui) {
-    let pane = cx.state.settings.scene_sides();
-    ui.label(caption("3D picture", cx.p));
     let angles = cx.shared.angles[cx.state.workbench.side as usize];
-    for (ground, name, on) in [
-        (Ground::White, "white", "on white"),
-        (Ground::Black, "black", "on black"),
-        (Ground::Transparent, "no ground", "without ground"),
+    let pane = cx.state.settings.scene_sides();
+    let asked = StillAsked { pane, width_px: 2 * WIDTH_PX, ground: Ground::White, angles, turntable: None };
+    for (asked, text) in [
+        (asked, "Save 3D picture…"),
+        (StillAsked { ground: Ground::Transparent, ..asked }, "Save 3D picture without ground…"),
+        (StillAsked { turntable: Some(FRAMES), ..asked }, "Save a turn around the pair…"),
     ] {
-        ui.horizontal(|ui| {
-            let asked = StillAsked { pane, width_px: WIDTH_PX, ground, angles, turntable: None };
-            let sizes = [(WIDTH_PX, "1x"), (2 * WIDTH_PX, "2x"), (4 * WIDTH_PX, "4x"), (8192, "8k")];
-            let sizes = sizes.map(|(width_px, text)| (StillAsked { width_px, ..asked }, text));
-            for (asked, text) in sizes.into_iter().chain([(StillAsked { turntable: Some(FRAMES), ..asked }, "film")]) {
-                let button = ui.add_enabled(export::can_draw(cx.state), egui::Button::new(text));
-                let button = button.accessible_name(format!("Save 3D picture {text} {on}"));
-                let size = format!("{} x {} pixels {on}", asked.width_px, asked.width_px);
-                let tip = match asked.turntable {
-                    None => format!("Save as PNG, {size}, from this viewpoint"),
-                    Some(frames) => {
-                        format!("Save one turn around the pair as {frames} PNG files, {size}")
-                    }
-                };
-                if button.on_hover_text(tip).clicked() {
-                    cx.push(ExportCommand::Place(Output::Still(asked)));
-                    ui.close();
-                }
-            }
-            ui.label(caption(name, cx.p));
-        });
+        let frames = asked.turntable.map_or("as PNG".to_owned(), |frames| format!("as {frames} PNG files"));
+        let tip = format!("{frames}, {0} x {0} pixels; the verb `still` has other sizes", asked.width_px);
+        let button = ui.add_enabled(export::can_draw(cx.state), egui::Button::new(text));
+        if button.on_hover_text(tip).clicked() {
+            cx.push(ExportCommand::Place(Output::Still(asked)));
+            ui.close();
+        }
     }
 }
 
@@ -65,7 +50,7 @@ pub(crate) fn menu(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane) {
         None if pane.is_of_pair() => &[Action::ExportMeasured, Action::ExportPredicted],
         None => &[],
     };
-    let table: &[Action] = if matches!(pane, Pane::Results | Pane::Table) { &[Action::ExportTable] } else { &[] };
+    let table: &[Action] = if pane == Pane::Results { &[Action::ExportTable] } else { &[] };
     for action in sides.iter().chain(table).copied() {
         if cx.menu_row(ui, action, false).clicked() {
             ui.close();
@@ -77,7 +62,7 @@ pub(crate) fn menu(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane) {
         (true, "Copy as picture", Action::CopyPane.behind("Copies this pane as a picture")),
     ] {
         if ui.button(text).on_hover_text(tip).clicked() {
-            cx.push(ViewCommand::Ui(UiRequest::PictureOf { pane, copied }));
+            cx.push(ViewCommand::Ui(UiRequest::PanePicture { pane: Some(pane), copied }));
             ui.close();
         }
     }

@@ -172,7 +172,7 @@ mod tests {
         let mut missing = tree.clone();
         missing.remove_recursively(log);
         assert!(!is_valid(&missing, workspace));
-        for extra in [Pane::Browser, Pane::Table] {
+        for extra in [Pane::Browser, Pane::Results] {
             let mut more = tree.clone();
             let id = more.tiles.insert_pane(extra);
             let root = more.root().unwrap();

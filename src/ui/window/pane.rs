@@ -73,12 +73,14 @@ fn show(cx: &mut Cx<'_>, ui: &mut Ui, panes: &mut Panes, pane: Pane) {
         panes.hovered = Some(pane);
     }
     // How a prediction was made stands below whatever shows it.
-    let (place, below) = made_with::split(cx, ui.max_rect(), made_with::is_predicted(cx, pane));
+    // The measured imprint leaves as much free: both color bars lie at one height.
+    let predicted = made_with::is_predicted(cx, pane);
+    let (place, below) = made_with::split(cx, ui.max_rect(), predicted || pane == Pane::Measured);
     ui.scope_builder(egui::UiBuilder::new().max_rect(place), |ui| {
         ui.set_clip_rect(place.intersect(ui.clip_rect()));
         draw(cx, ui, &mut panes.memories, pane);
     });
-    if let Some(below) = below {
+    if let Some(below) = below.filter(|_| predicted) {
         made_with::show(cx, ui, pane.title(), place, below);
     }
 }
@@ -89,7 +91,7 @@ fn controls(cx: &Cx<'_>, pane: Pane) -> &'static [(&'static str, &'static str)] 
         Kind::Form => &[],
         Kind::Imprint(_) if cx.state.selection.panes.contains(&Pane::Masks) => help::PAINT,
         Kind::Color | Kind::Imprint(_) => help::IMAGE,
-        Kind::Versus => help::VERSUS,
+        Kind::Compare => help::COMPARE,
         Kind::Scene => help::SCENE,
         Kind::Steps => help::STEPS,
     }

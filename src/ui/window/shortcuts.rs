@@ -1,11 +1,11 @@
-//! Keys to actions, and the sheet that lists them: both from the one table of actions.
+//! Keys to actions, and the list of them: both from the one table of actions.
 
-mod sheet;
+mod list;
 
 use eframe::egui::{self, Key as EKey};
 use strum::IntoEnumIterator as _;
 
-pub(crate) use self::sheet::{Memory, sheet};
+pub(crate) use self::list::{Memory, list};
 use crate::app::action::{Action, Key, Shortcut};
 use crate::app::pane::{Kind, Pane};
 

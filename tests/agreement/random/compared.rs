@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use strum::IntoEnumIterator as _;
 use touch2touch::app::results;
 use touch2touch::app::settings::prefer;
-use touch2touch::app::settings::{Versus, VersusMode};
+use touch2touch::app::settings::{CompareChoice, CompareMode};
 use touch2touch_pipeline::compare::Comparison;
 use touch2touch_pipeline::compare::subject::{Mapping, RecipeChange, Subject};
 
@@ -46,25 +46,26 @@ pub(in crate::agreement) fn any_two_imprints_differ_by_the_same_in_the_pane_and_
         for at in 0..2 {
             let recipe = draws.posed();
             // Prediction against measurement is a column of figures, whose command the figures' test holds.
-            let versus = loop {
-                let drawn = Versus { a: draws.one(subject()), b: draws.one(subject()), mode: VersusMode::Difference };
+            let compared = loop {
+                let drawn =
+                    CompareChoice { a: draws.one(subject()), b: draws.one(subject()), mode: CompareMode::Difference };
                 if !drawn.is_error() {
                     break drawn;
                 }
             };
-            let shown = versus.clone();
-            both.studio.send(prefer(move |s| *s.versus_mut() = shown.clone()).into());
+            let shown = compared.clone();
+            both.studio.send(prefer(move |s| *s.compare_mut() = shown.clone()).into());
             both.predict(&recipe, 29 * at);
             let state = &both.studio.state;
-            let what = format!("{}: {} and {}, {recipe:?}", state.pair_name(), versus.a, versus.b);
+            let what = format!("{}: {} and {}, {recipe:?}", state.pair_name(), compared.a, compared.b);
             let said = both.said(Pane::Compare).unwrap_or_else(|err| panic!("{what}: {err}"));
             for finger in said["fingers"].as_array().unwrap_or_else(|| panic!("{what}: {said}")) {
                 let pad = state.rig().pads().find(|pad| finger["finger"] == *state.finger_name(*pad)).unwrap();
                 let measured = |subject: &Subject| (*subject != Subject::Measured).then_some(Subject::Measured);
                 for (key, one, other) in [
-                    ("a", &versus.a, measured(&versus.a)),
-                    ("b", &versus.b, measured(&versus.b)),
-                    ("a_b", &versus.a, Some(versus.b.clone())),
+                    ("a", &compared.a, measured(&compared.a)),
+                    ("b", &compared.b, measured(&compared.b)),
+                    ("a_b", &compared.a, Some(compared.b.clone())),
                 ] {
                     let shown = match other {
                         Some(other) => {
@@ -75,7 +76,7 @@ pub(in crate::agreement) fn any_two_imprints_differ_by_the_same_in_the_pane_and_
                     count += same(&shown, &finger[key], &format!("{what}: {key}"));
                 }
             }
-            let [a, b] = [&versus.a, &versus.b].map(|subject| results::subject_pose(state, subject));
+            let [a, b] = [&compared.a, &compared.b].map(|subject| results::subject_pose(state, subject));
             assert_eq!(said["poses"].is_null(), a.is_none() || b.is_none(), "{what}: {}", said["poses"]);
             for (key, pose) in [("a", a), ("b", b)] {
                 let Some(pose) = pose.filter(|_| !said["poses"].is_null()) else { continue };

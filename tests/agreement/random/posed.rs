@@ -34,7 +34,7 @@ pub(in crate::agreement) fn every_step_of_a_registration_is_the_same_in_the_time
     let mut counts = Vec::new();
     for mut both in with_poses(home.path()) {
         let mut count = 0;
-        both.show(&[Pane::TimeMachine, Pane::Predicted]);
+        both.show(&[Pane::Steps, Pane::Predicted]);
         for at in 0..2 {
             let recipe = draws.posed();
             both.predict(&recipe, 17 * at);
@@ -45,7 +45,7 @@ pub(in crate::agreement) fn every_step_of_a_registration_is_the_same_in_the_time
                 for start in [None, Some(by_hand)] {
                     both.studio.send(InspectCommand::Start(start).into());
                     let what = format!("{} {source:?} {start:?}, {recipe:?}", both.studio.state.pair_name());
-                    let said = both.said(Pane::TimeMachine);
+                    let said = both.said(Pane::Steps);
                     let shown = results::inspection(&both.studio.state);
                     let Lookup::Ready(found) = shown else {
                         same_reason(shown, said, &what);

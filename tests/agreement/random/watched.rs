@@ -103,7 +103,7 @@ pub(in crate::agreement) fn what_lies_in_a_folder_is_watched_to_the_numbers_that
         assert_eq!(found.len() as u32, both.pairs(), "{found:?}");
         let mut count = 0;
         for (name, file) in found {
-            let index = both.studio.state.library.open.as_ref().unwrap().source.index().pairs.clone();
+            let index = both.studio.state.library.open.as_ref().unwrap().source.dataset.index.pairs.clone();
             let at = index.iter().position(|pair| pair.name == name).unwrap_or_else(|| panic!("no {name}"));
             both.predict(&recipe, at as u32);
             count += same_touch(&both, &file, &format!("{recipe:?}"));

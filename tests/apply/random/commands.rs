@@ -14,7 +14,7 @@ use touch2touch::app::command::{
     UnsavedCommand, ViewCommand, WorkbenchCommand,
 };
 use touch2touch::app::doctor::{Examine, ReadOtherwise, TryModels};
-use touch2touch::app::effect::{Ended, LabelsToSave, NotSaved};
+use touch2touch::app::effect::{LabelsToSave, NotSaved, TaskResult};
 use touch2touch::app::evaluate::{Score, ScoreChoice};
 use touch2touch::app::export::{Output, StillAsked};
 use touch2touch::app::keys::{AmbiguityKey, Preview};
@@ -25,12 +25,12 @@ use touch2touch::app::labels::{ImportMasks, PairLabels, Review, StrokeIn3d};
 use touch2touch::app::learn::{AdaptPairs, Learn, LearnForm, Learned, Network};
 use touch2touch::app::library::{Open, Place, ReadTool, Sort};
 use touch2touch::app::predict::{Generate, Refit};
-use touch2touch::app::services::{Followed, Services as _};
 use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{
-    Change, ColorMap, ColorRange, GelView, GenerateSettings, Last, LayerLook, LayerSize, MaskChoice, MaskSettings,
-    MaskSource, MaskTool, SceneLayer, SceneLook, Settings, SpacePane, Theme, Versus, VersusMode, Workspace,
+    Change, ColorMap, ColorRange, CompareChoice, CompareMode, GelView, GenerateSettings, Last, MaskChoice,
+    MaskSettings, MaskSource, MaskTool, SceneLayer, SceneLook, Settings, SpacePane, Theme, Workspace,
 };
+use touch2touch::app::source::{Followed, Source};
 use touch2touch::app::state::results::{Computed, Request};
 use touch2touch::app::tasks::{TaskKind, Ticket, Write};
 use touch2touch::app::workbench::{Layer, Picked, SceneTool};
@@ -60,7 +60,7 @@ use touch2touch_pipeline::steps::tool::UnitSet;
 use touch2touch_pipeline::still::space::{Ground, ViewAngles};
 
 use super::super::answered::{adapted, trained};
-use super::super::double::Double;
+use super::super::bench::models;
 
 fn position() -> impl Strategy<Value = [f32; 2]> {
     prop_oneof![
@@ -119,10 +119,9 @@ fn cure() -> impl Strategy<Value = Cure> {
 }
 
 fn scene() -> impl Strategy<Value = SceneLook> {
-    (any_of::<SceneLayer>(), [number(), number(), number()], any::<bool>()).prop_map(|(layer, [a, b, c], on)| {
-        let look = LayerLook { shown: on, color: None, opacity: a, size: LayerSize::Mm(b) };
-        let mut scene = SceneLook { distance_m: c, eye_dome: on, ..SceneLook::default() };
-        scene.set(layer, look);
+    (any_of::<SceneLayer>(), number()).prop_map(|(layer, distance_m)| {
+        let mut scene = SceneLook { distance_m, ..SceneLook::default() };
+        scene.toggle(layer);
         scene
     })
 }
@@ -140,8 +139,8 @@ fn subject() -> impl Strategy<Value = Subject> {
     select(texts.map(|text| text.parse().expect("a subject")).to_vec())
 }
 
-fn versus() -> impl Strategy<Value = Versus> {
-    (subject(), subject(), any_of::<VersusMode>()).prop_map(|(a, b, mode)| Versus { a, b, mode })
+fn compare_choice() -> impl Strategy<Value = CompareChoice> {
+    (subject(), subject(), any_of::<CompareMode>()).prop_map(|(a, b, mode)| CompareChoice { a, b, mode })
 }
 
 fn planar() -> impl Strategy<Value = PlanarPose> {
@@ -149,7 +148,7 @@ fn planar() -> impl Strategy<Value = PlanarPose> {
 }
 
 fn place() -> impl Strategy<Value = Place> {
-    select(vec![Place::Demo, Place::Path("missing".into()), Place::Path("elsewhere".into())])
+    select(vec![Place::Path("missing".into()), Place::Path("elsewhere".into())])
 }
 
 fn shift() -> impl Strategy<Value = ShiftMode> {
@@ -167,15 +166,19 @@ fn unsaved() -> impl Strategy<Value = UnsavedCommand> {
         UnsavedCommand::Discard,
         UnsavedCommand::Retry,
         UnsavedCommand::AskFolder,
-        UnsavedCommand::Elsewhere("elsewhere".into()),
+        UnsavedCommand::Elsewhere("/dev/null/folder".into()),
     ])
+}
+
+fn demo() -> Arc<Source> {
+    Arc::new(Source::open(&Place::Demo, None).expect("it is built in"))
 }
 
 fn not_saved(seq: DatasetSeq) -> Box<NotSaved> {
     let (name, labels, deed) = ("tool_a/data_0".to_owned(), PairLabels::default(), Operation::default());
     let save = LabelsToSave { seq, name, revision: Revision(1), labels, deed };
     let err = TaskError::new("Save the labels", "no space left");
-    Box::new(NotSaved { source: Double::new(false, true).source, save, err })
+    Box::new(NotSaved { source: demo(), save, err })
 }
 
 fn ticket() -> impl Strategy<Value = Ticket> {
@@ -219,10 +222,10 @@ pub(super) fn change() -> impl Strategy<Value = Change> {
         3 => any_of::<Paint>().prop_map(|v| prefer(move |s| s.mask.paint = v)),
         2 => any_of::<MaskSource>().prop_map(|v| prefer(move |s| s.mask.choice.source = v)),
         1 => number().prop_map(|v| prefer(move |s| s.mask.radius_px = v)),
-        1 => any::<[bool; 5]>().prop_map(|[visible, outline, footprint, linked, hint]| {
+        1 => any::<[bool; 4]>().prop_map(|[visible, outline, footprint, hint]| {
             prefer(move |s| {
                 (s.mask_visible, s.mask_outline, s.footprint_visible) = (visible, outline, footprint);
-                (s.cameras_linked, s.hint_dismissed) = (linked, hint);
+                s.hint_dismissed = hint;
             })
         }),
         1 => number().prop_map(|v| prefer(move |s| s.mask_opacity = v)),
@@ -233,7 +236,7 @@ pub(super) fn change() -> impl Strategy<Value = Change> {
         1 => scene().prop_map(|v| prefer(move |s| s.scene = v.clone())),
         1 => any_of::<SpacePane>().prop_map(|sides| prefer(move |s| _ = s.sides.insert(s.workspace, sides))),
         1 => any_of::<GelView>().prop_map(|gel| prefer(move |s| s.gel = gel)),
-        1 => versus().prop_map(|v| prefer(move |s| *s.versus_mut() = v.clone())),
+        1 => compare_choice().prop_map(|v| prefer(move |s| *s.compare_mut() = v.clone())),
         1 => any_of::<Workspace>().prop_map(|v| prefer(move |s| s.workspace = v)),
     ]
     .prop_map(|command| match command {
@@ -301,37 +304,40 @@ fn evaluation() -> Evaluation {
 const NEVER: DatasetSeq = DatasetSeq(u32::MAX);
 
 fn followed() -> Followed {
-    let source = Double::new(false, true).source;
-    Followed { source, pair: PairId(0), completed: false, sample: Err(TaskError::new("Load", "it is half written")) }
+    Followed {
+        source: demo(),
+        pair: PairId(0),
+        completed: false,
+        sample: Err(TaskError::new("Load", "it is half written")),
+    }
 }
 
-/// The end of an errand of any kind, as empty as it can be. A kind that has none does not compile.
-fn ended() -> impl Strategy<Value = Ended> {
+/// The end of a task of any kind, as empty as it can be. A kind that has none does not compile.
+fn ended() -> impl Strategy<Value = TaskResult> {
     (any_of::<TaskKind>(), select(vec!["tool_a/data_0", "elsewhere"]), select(vec![DatasetSeq(1), NEVER])).prop_map(
         |(kind, name, seq)| match kind {
-            TaskKind::Open => {
-                let opened = Double::new(false, true).open(&Place::Demo).expect("the double opens");
-                Ended::of::<Open>((NEVER, Place::Path(name.into()), opened))
-            }
+            TaskKind::Open => TaskResult::of::<Open>((NEVER, Place::Path(name.into()), demo())),
             TaskKind::ReadTool => {
                 let (tool, word, file) = ("tool_a".into(), "mm".into(), "unit.txt".into());
                 let set = UnitSet { tool, unit: ToolUnit::Millimeters, file, word, not_written: None };
-                Ended::of::<ReadTool>((seq, set))
+                TaskResult::of::<ReadTool>((seq, set))
             }
-            TaskKind::Generate => Ended::of::<Generate>(Vec::new()),
-            TaskKind::Refit => Ended::of::<Refit>((statistics(), None)),
-            TaskKind::Write => Ended::of::<Write>(("Something".into(), "/dev/null/folder".into())),
+            TaskKind::Generate => TaskResult::of::<Generate>(Vec::new()),
+            TaskKind::Refit => TaskResult::of::<Refit>((statistics(), None)),
+            TaskKind::Write => TaskResult::of::<Write>(("Something".into(), "/dev/null/folder".into())),
             TaskKind::Import => {
-                Ended::of::<ImportMasks>(Import { new: 1, changed: vec![name.to_owned()], ..Import::default() })
+                TaskResult::of::<ImportMasks>(Import { new: 1, changed: vec![name.to_owned()], ..Import::default() })
             }
-            TaskKind::Evaluate => Ended::of::<Score>(Arc::new(evaluation())),
-            TaskKind::TryModels => Ended::of::<TryModels>(Some(Arc::new(Worth::default()))),
-            TaskKind::Examine => Ended::of::<Examine>(Arc::new(Examined::default())),
-            TaskKind::ReadOtherwise => Ended::of::<ReadOtherwise>((seq, "read-as.txt".into(), "swap-fingers".into())),
-            TaskKind::Learn if seq.0 % 2 == 0 => Ended::of::<Learn>(Learned::Generator(Arc::new(adapted()), None)),
+            TaskKind::Evaluate => TaskResult::of::<Score>(Arc::new(evaluation())),
+            TaskKind::TryModels => TaskResult::of::<TryModels>(Some(Arc::new(Worth::default()))),
+            TaskKind::Examine => TaskResult::of::<Examine>(Arc::new(Examined::default())),
+            TaskKind::ReadOtherwise => {
+                TaskResult::of::<ReadOtherwise>((seq, "read-as.txt".into(), "swap-fingers".into()))
+            }
+            TaskKind::Learn if seq.0 % 2 == 0 => TaskResult::of::<Learn>(Learned::Generator(Arc::new(adapted()), None)),
             TaskKind::Learn => {
-                let bundle = Double::new(false, true).find_bundles(&[]).0.remove(1);
-                Ended::of::<Learn>(Learned::Masks(Arc::new(trained()), bundle))
+                let bundle = models().remove(1);
+                TaskResult::of::<Learn>(Learned::Masks(Arc::new(trained()), bundle))
             }
         },
     )
@@ -450,9 +456,6 @@ draws! {
         1 Begin,
         1 End,
         1 Play(any::<bool>()),
-        1 Pin,
-        1 Unpin(0usize..4),
-        1 Lines(any::<bool>()),
     }
     workbench: WorkbenchCommand {
         1 SetLayer(any_of::<Layer>()),
@@ -467,17 +470,12 @@ draws! {
         1 RevertHand,
         1 Pick(proptest::option::of((source(), finger(), any::<[u16; 2]>())
             .prop_map(|(source, finger, pixel)| Picked { source, finger, pixel }))),
-        1 Mark(source(), point()),
-        1 ClearMarks,
     }
     evaluate: EvaluateCommand {
         1 Choose(Just(Arc::from("gen")), any::<bool>()),
-        1 Grasps(proptest::option::of(0usize..3)),
         1 Published(any::<bool>()),
         1 Start,
-        1 All,
-        1 Rank,
-        1 Export(Just(PathBuf::from("table"))),
+        1 Export(Just(PathBuf::from("/dev/null/folder"))),
     }
     export: ExportCommand {
         1 AskMasks(any::<bool>()),
@@ -524,7 +522,7 @@ draws! {
     // Answers that nobody waits for, or that come too late.
     answers: Answer {
         1 Followed(Just(NEVER), Just(()).prop_map(|()| followed())),
-        1 Bundles(Just(()).prop_map(|()| Double::new(false, true).find_bundles(&[]).0), Just(Vec::new())),
+        1 Bundles(Just(()).prop_map(|()| models()), Just(Vec::new())),
         1 SettingsLoaded(mask().prop_map(|mask| Box::new(Settings { mask, ..Settings::default() })), Just(None)),
         1 Demanded(touch().prop_map(|touch| vec![Request::Sample(touch.pair)])),
         1 Computed(select(vec![DatasetSeq(1), NEVER]),
@@ -533,14 +531,13 @@ draws! {
             Arc::new(Preview { recipe, picture: PreviewPicture { step: 1, of: 2, depth: DepthMap::filled(2, 2, 0.0) } })
         })),
         1 Progressed(ticket(), Just(Progress { done: 3, total: 4, text: "step".into(), ..Progress::default() })),
-        12 Ended(ticket(), ended()),
-        1 Revealed,
+        12 TaskResult(ticket(), ended()),
+        1 Done,
         1 TaskFailed(ticket(), error()),
         1 RequestFailed(select(vec![DatasetSeq(1), NEVER]), touch().prop_map(|t| Box::new(Request::Sample(t.pair))), error()),
         1 LabelsSaved(Just("tool_a/data_0".to_owned()), Just(Revision(u64::MAX)), Just(None)),
         1 LabelsFailed(select(vec![DatasetSeq(1), NEVER]).prop_map(not_saved)),
         1 LabelsKept(select(vec![Vec::new(), vec![("tool_a/data_0".to_owned(), Revision(1))]]), Just(PathBuf::from("elsewhere"))),
-        1 SettingsSaved,
         1 JobFailed(error()),
     }
 }
@@ -549,6 +546,7 @@ draws! {
 pub(super) fn command() -> impl Strategy<Value = Command> {
     let ways = vec![
         (6, library().boxed()),
+        (1, follow().boxed()),
         (6, view().boxed()),
         (4, predict().boxed()),
         (36, labels().boxed()),
@@ -565,7 +563,7 @@ pub(super) fn command() -> impl Strategy<Value = Command> {
     Union::new_weighted(ways).prop_map(|command: Command| {
         // A room that is not among the ways above does not compile.
         match command {
-            Command::Library(_) | Command::View(_) | Command::Predict(_) => {}
+            Command::Library(_) | Command::Follow(_) | Command::View(_) | Command::Predict(_) => {}
             Command::Labels(_)
             | Command::Inspect(_)
             | Command::Workbench(_)

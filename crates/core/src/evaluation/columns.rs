@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use serde::ser::{SerializeMap as _, Serializer};
 
-use super::{Estimate, GraspScore, Group, Row, angles, images, mean, psnr};
+use super::{Estimate, GraspScore, Group, Metric, Row, angles, images, mean, psnr};
 use crate::metrics::frechet_distance;
 use crate::sample::Scale;
 use crate::verdict::Grade;
@@ -21,7 +21,7 @@ pub struct Column {
     /// True where more of it is better.
     pub larger_is_better: bool,
     /// The name in files.
-    pub(super) key: &'static str,
+    pub key: &'static str,
     /// The figure of a group.
     pub(super) of: Of,
 }
@@ -86,6 +86,28 @@ pub(super) static COLUMNS: &[Column] = &[
         |tool| mean(tool.iter().filter_map(|g| g.verdict).map(|grade| if grade == Grade::Good { 100.0 } else { 0.0 })),
     ),
 ];
+
+impl Column {
+    /// The figure of a single grasp; `None` for a column that only a group has.
+    pub fn of_grasp(&self, grasp: &GraspScore) -> Option<f64> {
+        match self.of {
+            Of::Tool(of) => of(&[grasp]),
+            Of::Group(_) => None,
+        }
+    }
+
+    /// The metric of a grasp that the column averages, by which pairs can be sorted.
+    pub fn metric(&self) -> Option<Metric> {
+        match self.key {
+            "psnr_db" => Some(Metric::Psnr),
+            "psnr_noise_free_db" => Some(Metric::PsnrNoiseFree),
+            "ssim" => Some(Metric::Ssim),
+            "angle_deg" => Some(Metric::Angle),
+            "verdict_good" => Some(Metric::Verdict),
+            _ => None,
+        }
+    }
+}
 
 /// The features of the images that have some.
 fn features<'a>(grasps: &'a [&GraspScore]) -> Vec<&'a [f32]> {

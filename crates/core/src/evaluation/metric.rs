@@ -31,7 +31,6 @@ pub enum Metric {
 struct Row {
     metric: Metric,
     name: &'static str,
-    short: &'static str,
     key: &'static str,
     tip: &'static str,
     unit: &'static str,
@@ -45,7 +44,6 @@ struct Row {
 const PLAIN: Row = Row {
     metric: Metric::Angle,
     name: "",
-    short: "",
     key: "",
     tip: "",
     unit: "",
@@ -61,7 +59,6 @@ static ROWS: &[Row] = &[
     Row {
         metric: Metric::Angle,
         name: "Angle error",
-        short: "angle",
         key: "angle",
         tip: "Error of the in-hand angle from the contact of both fingers, degrees",
         unit: "°",
@@ -73,7 +70,6 @@ static ROWS: &[Row] = &[
     Row {
         metric: Metric::Verdict,
         name: "Verdict",
-        short: "verdict",
         key: "verdict",
         tip: "How much the pose can be relied on, without the truth: good, check or wrong",
         decimals: 0,
@@ -84,7 +80,6 @@ static ROWS: &[Row] = &[
     Row {
         metric: Metric::Psnr,
         name: "PSNR",
-        short: "PSNR",
         key: "psnr",
         tip: "Against the measured imprint, dB; peak 22.5 mm, or both scaled to 0..1 where the scale is assumed",
         of: |grasp| psnr(&[grasp], |image| Some(image.error)),
@@ -93,7 +88,6 @@ static ROWS: &[Row] = &[
     Row {
         metric: Metric::Ssim,
         name: "SSIM",
-        short: "SSIM",
         key: "ssim",
         tip: "Structural similarity; range of the tool's predictions (the lab's), or both scaled to 0..1 where the scale is assumed",
         of: |grasp| mean(grasp.images.iter().filter_map(|image| image.ssim)),
@@ -102,7 +96,6 @@ static ROWS: &[Row] = &[
     Row {
         metric: Metric::PsnrNoiseFree,
         name: "PSNR noise-free",
-        short: "clean",
         key: "psnr-clean",
         tip: "Against the simulator's imprint without camera noise, dB",
         of: |grasp| psnr(&[grasp], |image| image.noise_free),
@@ -118,11 +111,6 @@ impl Metric {
     /// The name on screen.
     pub fn name(self) -> &'static str {
         self.row().name
-    }
-
-    /// The name in a word, for the head of a column.
-    pub fn short(self) -> &'static str {
-        self.row().short
     }
 
     /// The word in the filter of the list.

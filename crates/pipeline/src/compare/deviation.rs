@@ -1,12 +1,9 @@
-//! Distances of the contact points from the registered model: [`deviation`]; and of one cloud from another:
-//! [`cloud_difference`].
+//! Distances of the contact points from the registered model: [`deviation`].
 
 use crate::steps::cloud::Clouds;
-use crate::steps::estimate::Estimate;
 use touch2touch_core::colormap::ColorMap;
-use touch2touch_core::deviation::{Painted, of_points, on_surface, to_cloud};
+use touch2touch_core::deviation::{Painted, of_points, on_surface};
 use touch2touch_core::frames::PlanarPose;
-use touch2touch_core::grid::DepthMap;
 use touch2touch_core::pose::ToolModel;
 use touch2touch_core::rig::PerPad;
 
@@ -34,48 +31,6 @@ impl Deviation {
         let points: usize = self.points.iter().flatten().map(Vec::len).sum();
         4 * points + 28 * self.surface.mesh.vertices.len() + 12 * self.surface.mesh.triangles.len()
     }
-}
-
-/// Distances of the points of a cloud from another of the same cameras.
-#[derive(Clone, Debug)]
-pub struct CloudDifference {
-    /// Of each point, in the order of the first cloud, meters: positive where its imprint is the deeper one; NaN of a
-    /// finger that the other cloud lacks.
-    pub points: PerPad<Vec<f32>>,
-    /// Root mean square over the contact points of the first cloud, meters; NaN without one.
-    pub contact_rms_m: f64,
-}
-
-impl CloudDifference {
-    /// Bytes held.
-    pub fn bytes(&self) -> usize {
-        4 * self.points.iter().flatten().map(Vec::len).sum::<usize>()
-    }
-}
-
-/// Measures the surface points of `a` against those of `b`, both by [`Estimate::of_masks`]; their imprints say which is
-/// deeper.
-pub fn cloud_difference(a: &Estimate, b: &Estimate) -> CloudDifference {
-    let (mut squares, mut count) = (0.0, 0usize);
-    let mut points = PerPad::default();
-    for (pad, cloud) in a.surface().fingers.entries() {
-        let others = b.surface().finger(pad).map_or(&[][..], |cloud| &cloud.points);
-        let mut found = to_cloud(&cloud.points, others);
-        for ((d, pixel), contact) in found.iter_mut().zip(&cloud.pixels).zip(&cloud.contact) {
-            let at = |depth: &DepthMap| depth.get(pixel[0].into(), pixel[1].into()).copied();
-            let deeper =
-                a.imprints[pad].as_ref().zip(b.imprints[pad].as_ref()).and_then(|(a, b)| Some(at(a)? - at(b)?));
-            if deeper.is_some_and(|deeper| deeper < 0.0) {
-                *d = -*d;
-            }
-            if *contact && d.is_finite() {
-                squares += f64::from(*d).powi(2);
-                count += 1;
-            }
-        }
-        points[pad] = Some(found);
-    }
-    CloudDifference { points, contact_rms_m: if count == 0 { f64::NAN } else { (squares / count as f64).sqrt() } }
 }
 
 /// Measures the contact points of both fingers against the model at a pose.

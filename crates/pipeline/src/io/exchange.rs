@@ -155,10 +155,7 @@ impl Default for ExportConfig {
         Self {
             format: Format::default(),
             seed: 0,
-            val: 0.1,
-            test: 0.1,
             by_tool: false,
-            test_tools: Vec::new(),
             held_out_in_train: false,
             rig: Rig::lab(),
         }
@@ -455,7 +452,7 @@ mod tests {
         };
         for format in Format::iter() {
             let folder = dir.path().join(format.key());
-            let config = ExportConfig { format, val: 0.0, test: 0.0, ..ExportConfig::default() };
+            let config = ExportConfig { format, ..ExportConfig::default() };
             export(&folder, &entries, &config, |i| Ok(content(i))).unwrap();
             let stems = split::stems(&entries, &config.rig);
             let written = |i: usize| (stems[i].clone(), digest(&mask(i), content(i).ignored.as_ref()));
@@ -466,10 +463,11 @@ mod tests {
             let gone = check_written(&folder, format, extra.collect());
             assert!(gone.len() == 1 && gone[0].what.contains("the mask of gone is not there"), "{gone:?}");
             let (other, stem) = (format::gray(&mask(5)), &stems[2]);
-            let file = match format {
-                Format::Unet => folder.join(format!("train/masks/{stem}.png")),
-                Format::Png => folder.join(format!("train/{stem}.png")),
+            let name = match format {
+                Format::Unet => format!("masks/{stem}.png"),
+                Format::Png => format!("{stem}.png"),
             };
+            let file = PARTS.map(|part| folder.join(part).join(&name)).into_iter().find(|file| file.is_file()).unwrap();
             crate::io::images::write_gray8(&file, &other).unwrap();
             let found = check(&[0, 1, 2]);
             assert!(found.len() == 1 && found[0].file == file, "{format:?}: {found:?}");

@@ -12,13 +12,12 @@ use crate::job::JobCx;
 use crate::labels::{ImprintOf, ImprintSource, PairLabels};
 use crate::steps::cloud::{Clouds, images};
 use crate::steps::imprint::{imprints_of, measured};
-use crate::steps::mask::{Contact, MaskInputs, MaskRecipe, contact_mask, no_mask_model};
+use crate::steps::mask::{Contact, MaskInputs, contact_mask, no_mask_model};
 use crate::steps::models::Models;
 use crate::steps::pose::{PoseResult, pose};
 use crate::steps::prediction::Prediction;
 use crate::steps::recipe::{Recipe, Stage};
 use touch2touch_core::align::{Ask, Contacts, Register};
-use touch2touch_core::contact::ContactMask;
 use touch2touch_core::contact::GEL_CONTACT_M;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::frames::PlanarPose;
@@ -56,6 +55,8 @@ pub struct Estimate {
     /// Meters, raw orientation.
     pub imprints: Arc<PerPad<DepthMap>>,
     probabilities: PerPad<Probability>,
+    /// Pads whose masks cannot be made.
+    unmasked: Vec<PadId>,
     contact: Option<Arc<Contact>>,
     surface: Option<Arc<Clouds>>,
     points: Option<Arc<Result<Vec<DVec3>, TaskError>>>,
@@ -93,8 +94,8 @@ impl Estimate {
         Self { recipe: recipe.clone(), ..Self::default() }
     }
 
-    /// Imprints of a recipe that were made together with others.
-    pub(crate) fn with_imprints(recipe: &Recipe, imprints: PerPad<DepthMap>) -> Self {
+    /// Imprints of a recipe that were made before.
+    pub fn with_imprints(recipe: &Recipe, imprints: PerPad<DepthMap>) -> Self {
         Self { imprints: Arc::new(imprints), reached: Some(Stage::Imprint), ..Self::new(recipe) }
     }
 
@@ -103,30 +104,42 @@ impl Estimate {
         Self::with_imprints(&Recipe { hand: false, ..recipe.clone() }, imprints)
     }
 
-    /// The surface of imprints whose masks were made one by one, with the contact points; a pad without a mask has none.
-    /// `made_by` is the recipe of the masks that nobody drew, if there are any.
+    /// Predictions of a recipe that were made before.
+    pub fn of_predictions(recipe: &Recipe, predictions: PerPad<Prediction>) -> Self {
+        Self { predictions: Arc::new(predictions), reached: Some(Stage::Prediction), ..Self::new(recipe) }
+    }
+
+    /// Itself without masks of some pads: none can be made.
+    #[must_use]
+    pub fn without_masks(self, unmasked: Vec<PadId>) -> Self {
+        Self { unmasked, ..self }
+    }
+
+    /// Takes over what another estimate knows of the imprint of a pad, which is the same: its prediction, and what the mask
+    /// model said of it.
+    pub fn take_over(&mut self, pad: PadId, other: &Self) {
+        if let Some(made) = &other.predictions[pad] {
+            Arc::make_mut(&mut self.predictions)[pad] = Some(made.clone());
+        }
+        if self.recipe.mask_model == other.recipe.mask_model && self.recipe.engine == other.recipe.engine {
+            self.probabilities[pad].clone_from(&other.probabilities[pad]);
+        }
+    }
+
+    /// True where it is known what the mask model says of the imprint of a pad.
+    pub fn has_probability(&self, pad: PadId) -> bool {
+        self.probabilities[pad].is_some()
+    }
+
+    /// Itself with all surface points, the contact points marked.
     ///
     /// # Errors
     /// As [`Contact::clouds`].
-    pub fn of_masks(
-        imprint: ImprintSource,
-        made_by: Option<MaskRecipe>,
-        imprints: PerPad<DepthMap>,
-        masks: PerPad<ContactMask>,
-        sample: &Sample,
-    ) -> Result<Self, TaskError> {
-        let recipe = Recipe { imprint, ..Recipe::default() };
-        let made_by = made_by.map_or_else(|| recipe.mask_recipe(&sample.rig), Ok)?;
-        let contact = Contact { imprints, masks, recipe: made_by, model: None };
-        Ok(Self {
-            recipe,
-            reached: Some(Stage::Cloud),
-            imprints: Arc::new(contact.imprints.clone()),
-            surface: Some(Arc::new(contact.clouds(sample)?)),
-            points: Some(Arc::new(contact.points(sample))),
-            contact: Some(Arc::new(contact)),
-            ..Self::default()
-        })
+    pub fn with_surface(mut self, sample: &Sample) -> Result<Self, TaskError> {
+        if self.surface.is_none() {
+            self.surface = Some(Arc::new(self.contact().clouds(sample)?));
+        }
+        Ok(self)
     }
 
     /// The pose that one from other imprints is compared with: the true one, or that of the measured imprints of pictures,
@@ -168,7 +181,7 @@ impl Estimate {
                     }
                 }
                 Stage::Mask => estimate.contact = self.contact.clone(),
-                Stage::Cloud => estimate.points = self.points.clone(),
+                Stage::Cloud => (estimate.points, estimate.surface) = (self.points.clone(), self.surface.clone()),
                 Stage::Pose => estimate.pose = self.pose.clone(),
             }
         }
@@ -303,8 +316,8 @@ impl Estimate {
         let made_by = self.recipe.mask_recipe(&touch.sample.rig)?;
         let of = self.recipe.imprint_of();
         let inputs = self.mask_inputs(touch, &of);
-        let (imprints, mut masks) = (self.imprints.clone(), PerPad::default());
-        for (pad, imprint) in imprints.entries() {
+        let (imprints, unmasked, mut masks) = (self.imprints.clone(), self.unmasked.clone(), PerPad::default());
+        for (pad, imprint) in imprints.entries().filter(|(pad, _)| !unmasked.contains(pad)) {
             let unet = |imprint: &DepthMap| {
                 let (found, least) = self.probability(pad, models)?;
                 Ok(contact_of(&found.0, imprint, least))
@@ -346,9 +359,9 @@ impl Estimate {
     /// All surface points, with the contact points marked.
     ///
     /// # Panics
-    /// If it was not made by [`Self::of_masks`].
+    /// Before [`Self::with_surface`].
     pub fn surface(&self) -> &Clouds {
-        self.surface.as_ref().expect("the surface is made with the points of masks")
+        self.surface.as_ref().expect("the surface was asked for")
     }
 
     /// The contact points of all pads, grasp frame, meters.

@@ -51,7 +51,7 @@ const RANGE_KERNELS: f64 = 4.0;
 /// Range of the heat map for an engine without a kernel, meters.
 const RANGE_M: f64 = 4e-3;
 
-/// Layers of a recorded registration of an estimate by [`Estimate::of_masks`].
+/// Layers of a recorded registration of an estimate with its surface.
 ///
 /// # Errors
 /// If the run did not record what became of the points, or they are not those of the estimate.

@@ -7,6 +7,7 @@ use crate::infer::engine::EngineChoice;
 use crate::job::JobCx;
 use crate::steps::bundles::BundleInfo;
 use crate::steps::models::{GenerateInput, Models};
+use crate::steps::on_pad::OnPad;
 use crate::steps::prediction::Prediction;
 use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::grid::RgbGrid;
@@ -103,10 +104,33 @@ impl Generating<'_> {
     /// # Errors
     /// As [`Self::input`] and [`Models::predict`].
     pub fn pair(self, models: &Models, sample: &Sample, cx: &JobCx) -> Result<PerPad<Prediction>, TaskError> {
-        let pictures = self.pictures(&[sample])?;
-        let made = models.predict(self.bundle, self.engine, self.config, &self.wanted(&pictures), cx)?;
+        self.pads(models, sample, &sample.rig.pad_list(), cx)
+    }
+
+    /// As [`Self::pair`] of some pads, in one call of the model; who looks on knows a pad by its place among those with a
+    /// picture.
+    ///
+    /// # Errors
+    /// As [`Self::pair`].
+    pub fn pads(
+        self,
+        models: &Models,
+        sample: &Sample,
+        pads: &[PadId],
+        cx: &JobCx,
+    ) -> Result<PerPad<Prediction>, TaskError> {
+        let mut pictures = Vec::new();
+        for &pad in pads {
+            let size = sample.pad(pad).and_then(|touch| touch.depth()).map_or([0, 0], |felt| felt.imprint.size());
+            pictures.extend(self.picture(sample, pad)?.map(|picture| (pad, picture, size)));
+        }
+        let wanted: Vec<GenerateInput<'_>> = pictures
+            .iter()
+            .map(|(_, difference, size)| GenerateInput { difference, seed: self.config.seed, size: *size })
+            .collect();
+        let made = models.predict(self.bundle, self.engine, self.config, &wanted, cx)?;
         let mut out = PerPad::default();
-        for ((_, pad, _), made) in pictures.iter().zip(made) {
+        for ((pad, ..), made) in pictures.iter().zip(made) {
             out[*pad] = Some(made);
         }
         Ok(out)

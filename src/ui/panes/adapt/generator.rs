@@ -24,8 +24,8 @@ const CAPTION: f32 = 16.0;
 pub(super) fn worth(cx: &mut Cx<'_>, ui: &mut Ui) {
     let Some(adapted) = cx.state.learn.adapted.clone() else { return };
     refusal(cx, ui, &adapted);
-    scores(cx, ui, &adapted);
     before_and_after(cx, ui);
+    scores(cx, ui, &adapted);
     pads(cx, ui, &adapted);
     remarks(cx, ui, &adapted);
 }
@@ -75,7 +75,6 @@ fn refusal(cx: &mut Cx<'_>, ui: &mut Ui, adapted: &Adapted) {
 fn before_and_after(cx: &mut Cx<'_>, ui: &mut Ui) {
     let state = cx.state;
     let Some(held) = learn::held_back(state) else { return };
-    ui.add_space(8.0);
     ui.label(section("A touch left out of the fit", cx.p));
     // A fit that was made again has other pictures.
     let fit = state.learn.adapted.as_ref().map(|adapted| adapted.seconds.to_bits());
@@ -136,15 +135,11 @@ pub(super) fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
 /// A column of figures: heading, tooltip, value.
 type FitColumn = (&'static str, &'static str, fn(&Scored) -> Option<String>);
 
-const FIGURES: [FitColumn; 5] = [
+const FIGURES: [FitColumn; 3] = [
     ("PSNR dB", "Peak 22.5 mm; image pairs, which carry no scale, are both stretched to 0–1", |s| {
         Some(format!("{:.1} ± {:.1}", s.psnr_db?, s.psnr_spread_db?))
     }),
     ("SSIM", "Structural similarity, on the same images as PSNR", |s| Some(format!("{:.2}", s.ssim?))),
-    ("unscaled dB", "PSNR of the images as they are, not stretched", |s| Some(format!("{:.1}", s.psnr_raw_db?))),
-    ("shape dB", "PSNR after the best linear fit of the values: how good the shape alone is", |s| {
-        Some(format!("{:.1}", s.psnr_line_db?))
-    }),
     ("angle °", "Mean error of the in-hand angle; for image pairs against the angle from the measured imprint", |s| {
         Some(format!("{:.1}", s.angle.as_ref()?.mean_deg?))
     }),

@@ -3,7 +3,7 @@
 use crate::app::settings::prefer;
 use eframe::egui::{Button, Rect, RichText, Ui, UiBuilder, pos2, vec2};
 
-use super::{map_of, scale_note};
+use super::map_of;
 use crate::app::action::Action;
 use crate::app::command::SettingsCommand;
 use crate::app::settings::ColorRange;
@@ -50,7 +50,6 @@ pub(crate) fn error_bar(cx: &mut Cx<'_>, ui: &mut Ui, histogram: Option<&Histogr
         symmetric: true,
         histogram,
         locked: None,
-        note: scale_note(cx.state),
         tips: [AUTO.to_owned(), String::new()],
     };
     match bar.show(ui, Range::symmetric(cx.shared.views.error_mm)) {
@@ -66,7 +65,6 @@ pub(crate) fn error_bar(cx: &mut Cx<'_>, ui: &mut Ui, histogram: Option<&Histogr
 
 /// The bar of imprints.
 pub(crate) fn color_bar(cx: &mut Cx<'_>, ui: &mut Ui, histogram: Option<&Histogram>) {
-    let note = scale_note(cx.state);
     let range = cx.state.settings.range;
     let default = ColorRange::default();
     let bar = Colorbar {
@@ -76,7 +74,6 @@ pub(crate) fn color_bar(cx: &mut Cx<'_>, ui: &mut Ui, histogram: Option<&Histogr
         symmetric: false,
         histogram,
         locked: Some(range.locked),
-        note,
         tips: [Action::RangeOnce.behind(AUTO), Action::LockRange.behind(LOCK)],
     };
     match bar.show(ui, Range { lo: range.min_m * 1e3, hi: range.max_m * 1e3 }) {

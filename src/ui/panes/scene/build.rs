@@ -6,9 +6,9 @@ use eframe::egui::Color32;
 use glam::{DAffine3, DVec3};
 
 use super::{Memory, layers, rgb, steps};
-use crate::app::keys::{CloudKey, DatasetSeq, ImprintKey, ImprintSource};
+use crate::app::keys::{DatasetSeq, EstimateKey, ImprintKey, ImprintSource};
 use crate::app::results;
-use crate::app::settings::{LayerLook, LayerSize, SceneLayer};
+use crate::app::settings::SceneLayer;
 use crate::app::workbench::Layer;
 use crate::gpu::edges::EdgeStyle;
 use crate::gpu::mesh::{Look, MeshItem, MeshStyle, Shading};
@@ -26,11 +26,11 @@ use touch2touch_pipeline::steps::cloud::{Clouds, FingerCloud};
 /// Points as the renderer takes them, made once per cloud.
 pub(super) struct SceneCloud {
     /// The cloud.
-    pub key: CloudKey,
+    pub key: EstimateKey,
     /// Counts up with every new cloud.
     pub revision: u64,
-    /// Per finger: the membrane and the contact.
-    pub fingers: PerPad<[Arc<[DVec3]>; 2]>,
+    /// The contact points of each finger.
+    pub fingers: PerPad<Arc<[DVec3]>>,
     /// Window of the GelSlims on it: smallest and largest y and z, grasp frame.
     pub window: Option<[DVec3; 2]>,
 }
@@ -43,7 +43,7 @@ pub(super) struct SceneSurface {
 }
 
 /// A CAD model as the renderer takes it.
-pub(crate) struct SceneMesh {
+pub(super) struct SceneMesh {
     /// The data set and the tool.
     pub key: (DatasetSeq, String),
     /// Counts up with every new model.
@@ -53,20 +53,25 @@ pub(crate) struct SceneMesh {
 }
 
 /// Points for the renderer, made again only for another cloud.
-pub(super) fn update_cloud(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource, key: CloudKey, clouds: &Clouds) {
+pub(super) fn update_cloud(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource, key: EstimateKey, clouds: &Clouds) {
     update_surface(cx, memory, source, &key);
     let held = &mut memory.clouds[source as usize];
     if held.as_ref().is_some_and(|h| h.key == key) {
         return;
     }
     memory.revision += 1;
-    *held = Some(SceneCloud { key, revision: memory.revision, fingers: parts(clouds), window: window(cx, clouds) });
+    *held = Some(SceneCloud {
+        key,
+        revision: memory.revision,
+        fingers: contact_points(clouds),
+        window: window(cx, clouds),
+    });
 }
 
 /// The membranes as surfaces, made again only for other imprints.
-fn update_surface(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource, key: &CloudKey) {
+fn update_surface(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource, key: &EstimateKey) {
     let held = &mut memory.surfaces[source as usize];
-    if !cx.state.settings.scene.layer(SceneLayer::Surface).shown {
+    if !cx.state.settings.scene.shows(SceneLayer::Membrane) {
         *held = None;
         return;
     }
@@ -85,15 +90,12 @@ fn update_surface(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource, key: 
     *held = Some(SceneSurface { key, revision: memory.revision, fingers });
 }
 
-/// The points of each finger apart: membrane and contact.
-pub(crate) fn parts(clouds: &Clouds) -> PerPad<[Arc<[DVec3]>; 2]> {
-    let part = |f: &FingerCloud, contact: bool| {
-        let indices: Vec<usize> = (0..f.points.len()).filter(|i| f.contact.get(*i) == Some(&contact)).collect();
-        // The membrane only has to be seen, and seen through: every other pixel of every other row.
-        let kept = |i: &usize| contact || f.pixels.get(*i).is_some_and(|p| p[0] % 2 == 0 && p[1] % 2 == 0);
-        indices.into_iter().filter(kept).filter_map(|i| f.points.get(i).copied()).collect::<Arc<[DVec3]>>()
+/// The contact points of each finger.
+fn contact_points(clouds: &Clouds) -> PerPad<Arc<[DVec3]>> {
+    let contact = |f: &FingerCloud| {
+        f.points.iter().zip(&f.contact).filter(|(_, contact)| **contact).map(|(point, _)| *point).collect()
     };
-    clouds.fingers.as_ref().map(|cloud| cloud.map(|f| [part(f, false), part(f, true)]))
+    clouds.fingers.as_ref().map(|cloud| cloud.map(contact))
 }
 
 /// The box around the points that the color sensors see; x is left open.
@@ -114,7 +116,7 @@ fn window(cx: &Cx<'_>, clouds: &Clouds) -> Option<[DVec3; 2]> {
 }
 
 /// Makes the CAD model for the renderer, where it is another one.
-pub(crate) fn update_mesh(cx: &Cx<'_>, held: &mut Option<SceneMesh>, revision: &mut u64) {
+pub(super) fn update_mesh(cx: &Cx<'_>, held: &mut Option<SceneMesh>, revision: &mut u64) {
     let Some(tool) = results::tool(cx.state).shown() else { return };
     let Some(open) = &cx.state.library.open else { return };
     if held.as_ref().is_some_and(|m| m.key.0 == open.seq && m.key.1 == tool.name) {
@@ -125,16 +127,12 @@ pub(crate) fn update_mesh(cx: &Cx<'_>, held: &mut Option<SceneMesh>, revision: &
     *held = Some(SceneMesh { key, revision: *revision, mesh: Arc::new(tool.model.mesh.clone()) });
 }
 
-/// The color of a layer: the person's, else the theme's. No two layers share one.
+/// The color of a layer. No two layers share one.
 pub(super) fn color(cx: &Cx<'_>, source: ImprintSource, layer: SceneLayer) -> Color32 {
-    if let Some([r, g, b]) = cx.state.settings.scene.layer(layer).color {
-        return Color32::from_rgb(r, g, b);
-    }
     let p = cx.p;
     match layer {
         // The membrane recedes, the contact stands out.
-        SceneLayer::Membrane => theme::mix(p.canvas, side_color(p, source), 0.6),
-        SceneLayer::Surface => theme::mix(p.canvas, side_color(p, source), 0.7),
+        SceneLayer::Membrane => theme::mix(p.canvas, side_color(p, source), 0.7),
         SceneLayer::Contact => CONTACT,
         SceneLayer::OtherContact => side_color(p, source.other()),
         SceneLayer::Cad if cx.state.workbench.hand(source).is_some() => p.accent,
@@ -144,24 +142,21 @@ pub(super) fn color(cx: &Cx<'_>, source: ImprintSource, layer: SceneLayer) -> Co
         SceneLayer::Cad | SceneLayer::Registered => p.cad,
         SceneLayer::OtherCad => theme::mix(p.strong, side_color(p, source.other()), 0.7),
         SceneLayer::TrueCad => p.strong,
-        SceneLayer::Pins => p.pins[0],
         SceneLayer::Guides => p.weak,
     }
 }
 
 /// Everything one side shows.
 pub(super) fn scene_of(cx: &Cx<'_>, memory: &Memory, source: ImprintSource) -> SceneData {
-    let look = &cx.state.settings.scene;
-    let mut scene = SceneData { background: rgb(cx.p.canvas), eye_dome: look.eye_dome, ..SceneData::default() };
+    let mut scene = SceneData { background: rgb(cx.p.canvas), eye_dome: true, ..SceneData::default() };
     scene.cut = cut(cx, memory, source);
     clouds(cx, memory, source, &mut scene);
     surfaces(cx, memory, source, &mut scene);
     pointed(cx, source, &mut scene);
     picked(cx, source, &mut scene);
     meshes(cx, memory, source, &mut scene);
-    scene.lines.extend(layers::uncertainty(cx, source));
     steps::add(cx, memory, source, &mut scene);
-    if look.layer(SceneLayer::Guides).shown {
+    if cx.state.settings.scene.shows(SceneLayer::Guides) {
         guides(cx, &mut scene);
     }
     scene
@@ -179,75 +174,46 @@ pub(super) fn cut(cx: &Cx<'_>, memory: &Memory, source: ImprintSource) -> Vec<Pl
     planes
 }
 
-fn point_size(size: LayerSize) -> PointSize {
-    match size {
-        LayerSize::Px(px) => PointSize::Px(px),
-        LayerSize::Mm(mm) => PointSize::Meters(mm * 1e-3),
-    }
+/// The contact points of one finger, in one color.
+fn contact(finger: &str, revision: u64, points: &Arc<[DVec3]>, color: Color32) -> CloudItem {
+    const DIAMETER_M: f32 = 0.000_35;
+    items::contact(finger, (revision, points.clone()), rgb(color), (PointSize::Meters(DIAMETER_M), 1.0))
 }
 
-fn cloud_style(look: LayerLook, color: Color32) -> CloudStyle {
-    CloudStyle { color: rgb(color), size: point_size(look.size), opacity: look.opacity, ..CloudStyle::default() }
-}
-
-/// Membrane and contact points of both fingers.
+/// The contact points of both fingers, and those of the other side where both are shown in one view.
 fn clouds(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, scene: &mut SceneData) {
-    if let Some(cloud) = &memory.clouds[source as usize] {
-        for (finger, parts) in cloud.fingers.entries() {
-            for (part, (layer, name)) in
-                parts.iter().zip([(SceneLayer::Membrane, "membrane"), (SceneLayer::Contact, "contact")])
-            {
-                let look = cx.state.settings.scene.layer(layer);
-                if !look.shown {
-                    continue;
-                }
-                let mut item = CloudItem {
-                    name: format!("{name} {}", cx.state.finger_name(finger)),
-                    revision: cloud.revision,
-                    points: part.clone(),
-                    colors: PointColors::One,
-                    style: cloud_style(look, color(cx, source, layer)),
-                };
-                if layer == SceneLayer::Contact {
-                    layers::paint(memory, source, finger, &mut item);
-                }
-                scene.clouds.push(item);
-            }
+    let shows = |layer| cx.state.settings.scene.shows(layer);
+    if let Some(cloud) = memory.clouds[source as usize].as_ref().filter(|_| shows(SceneLayer::Contact)) {
+        for (finger, points) in cloud.fingers.entries() {
+            let color = color(cx, source, SceneLayer::Contact);
+            let mut item = contact(&cx.state.finger_name(finger), cloud.revision, points, color);
+            layers::paint(memory, source, finger, &mut item);
+            scene.clouds.push(item);
         }
     }
-    if cx.state.workbench.both_clouds {
-        other_cloud(cx, memory, source, scene);
+    let other = source.other();
+    let shown = cx.state.workbench.both_clouds && shows(SceneLayer::OtherContact);
+    // What is of another pair is no comparison.
+    let same_pair = |cloud: &&SceneCloud| results::cloud_key(cx.state, other) == Ok(Some(cloud.key.clone()));
+    if let Some(cloud) = memory.clouds[other as usize].as_ref().filter(|_| shown).filter(same_pair) {
+        for (finger, points) in cloud.fingers.entries() {
+            let color = color(cx, source, SceneLayer::OtherContact);
+            let mut item = contact(&cx.state.finger_name(finger), cloud.revision, points, color);
+            // The view is fitted to its own side.
+            item.name.insert_str(0, "other ");
+            scene.clouds.push(item);
+        }
     }
 }
 
 /// The membranes as surfaces.
 fn surfaces(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, scene: &mut SceneData) {
-    let look = cx.state.settings.scene.layer(SceneLayer::Surface);
-    let Some(held) = memory.surfaces[source as usize].as_ref().filter(|_| look.shown) else { return };
-    let color = rgb(color(cx, source, SceneLayer::Surface));
+    const OPACITY: f32 = 0.4;
+    let Some(held) = &memory.surfaces[source as usize] else { return };
+    let color = rgb(color(cx, source, SceneLayer::Membrane));
     for (finger, mesh) in held.fingers.entries() {
         let finger = cx.state.finger_name(finger);
-        scene.meshes.push(items::membrane(&finger, (held.revision, mesh.clone()), color, look.opacity));
-    }
-}
-
-/// The contact points of the other side, in its color, where both are shown in one view.
-fn other_cloud(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, scene: &mut SceneData) {
-    let other = source.other();
-    let look = cx.state.settings.scene.layer(SceneLayer::OtherContact);
-    let Some(cloud) = memory.clouds[other as usize].as_ref().filter(|_| look.shown) else { return };
-    // What is of another pair is no comparison.
-    if results::cloud_key(cx.state, other) != Ok(Some(cloud.key.clone())) {
-        return;
-    }
-    for (finger, [_, contact]) in cloud.fingers.entries() {
-        scene.clouds.push(CloudItem {
-            name: format!("other contact {}", cx.state.finger_name(finger)),
-            revision: cloud.revision,
-            points: contact.clone(),
-            colors: PointColors::One,
-            style: cloud_style(look, color(cx, source, SceneLayer::OtherContact)),
-        });
+        scene.meshes.push(items::membrane(&finger, (held.revision, mesh.clone()), color, OPACITY));
     }
 }
 
@@ -317,10 +283,8 @@ fn meshes(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, scene: &mut Scene
     let state = cx.state;
     let tool_now = results::tool(state).ready().map(|t| t.name.as_str());
     let Some(mesh) = memory.mesh.as_ref().filter(|m| Some(m.key.1.as_str()) == tool_now) else { return };
-    let settings = &state.settings.scene;
     for (layer, world_from_mesh) in models(cx, source) {
-        let look = settings.layer(layer);
-        if !look.shown {
+        if !state.settings.scene.shows(layer) {
             continue;
         }
         let color = color(cx, source, layer);
@@ -331,8 +295,8 @@ fn meshes(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, scene: &mut Scene
             shading: Shading::Smooth,
             values: Arc::default(),
             style: match layer {
-                SceneLayer::TrueCad => layers::dashed(world_from_mesh, color, look),
-                _ => layers::outline(world_from_mesh, color, look),
+                SceneLayer::TrueCad => items::truth(world_from_mesh, rgb(color), 1.0, 1.2),
+                _ => items::outline(world_from_mesh, rgb(color), 1.0, 2.0),
             },
         };
         if layer == SceneLayer::Cad {
@@ -341,8 +305,8 @@ fn meshes(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, scene: &mut Scene
                 && matches!(state.workbench.layer, Layer::Residuals | Layer::Reasons);
             item.style = MeshStyle {
                 look: if through { Look::XRay } else { Look::Solid },
-                opacity: if through { 0.6 } else { look.opacity },
-                edges: settings.edges.then(|| model_edges(cx, color)),
+                opacity: if through { 0.6 } else { 1.0 },
+                edges: Some(model_edges(cx, color)),
                 ..item.style
             };
             layers::paint_model(memory, source, world_from_mesh, &mut item);
@@ -352,12 +316,12 @@ fn meshes(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, scene: &mut Scene
 }
 
 /// The edges of a shaded model of a color.
-pub(crate) fn model_edges(cx: &Cx<'_>, color: Color32) -> EdgeStyle {
+fn model_edges(cx: &Cx<'_>, color: Color32) -> EdgeStyle {
     items::model_edges(rgb(color), rgb(cx.p.canvas))
 }
 
 /// Floor, grid and axes.
-pub(crate) fn guides(cx: &Cx<'_>, scene: &mut SceneData) {
+fn guides(cx: &Cx<'_>, scene: &mut SceneData) {
     let (ground, ink) = (rgb(cx.p.canvas), rgb(cx.p.weak));
     scene.floor = Some(items::floor(ground, ink));
     scene.lines.extend(items::guides(ground, ink, u64::from(*cx.p == theme::DARK)));

@@ -1,6 +1,6 @@
 //! Drawing on masks in a 3D view: the mask tools, on the points under the pointer.
 
-use eframe::egui::{FontId, Ui, pos2, vec2};
+use eframe::egui::{FontId, Ui, vec2};
 
 use super::{Memory, build, nearest};
 use crate::app::command::LabelsCommand;
@@ -80,16 +80,11 @@ pub(super) fn show(
         }
         _ => row.name.to_owned(),
     };
-    let turn = "Shift + drag turns, the middle button moves";
-    let font = FontId::proportional(11.0);
-    let mut corner = rect.min + vec2(8.0, 6.0);
-    for (text, color) in [(format!("{tool} {reach}"), cx.p.strong), (turn.to_owned(), cx.p.weak)] {
-        let galley = painter.layout(text, font.clone(), color, (rect.width() - 16.0).max(40.0));
-        let back = eframe::egui::Rect::from_min_size(corner, galley.size());
-        painter.rect_filled(back.expand2(vec2(4.0, 1.0)), 3.0, cx.p.canvas.gamma_multiply(0.8));
-        painter.galley(back.min, galley, color);
-        corner = pos2(corner.x, back.bottom() + 2.0);
-    }
+    let text = format!("{tool} {reach}\nShift + drag turns, the middle button moves");
+    let galley = painter.layout(text, FontId::proportional(11.0), cx.p.strong, (rect.width() - 16.0).max(40.0));
+    let back = eframe::egui::Rect::from_min_size(rect.min + vec2(8.0, 6.0), galley.size());
+    painter.rect_filled(back.expand2(vec2(4.0, 1.0)), 3.0, cx.p.canvas.gamma_multiply(0.8));
+    painter.galley(back.min, galley, cx.p.strong);
     if output.pointer.is_some() {
         let point = cx.shared.readout.take().filter(|_| meant.is_some());
         let reach = format!("{} {reach}", row.name);

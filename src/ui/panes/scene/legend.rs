@@ -2,17 +2,16 @@
 
 use crate::app::results;
 use crate::app::settings::prefer;
-use eframe::egui::containers::menu::MenuButton;
 use eframe::egui::{
-    self, Align2, Button, Color32, DragValue, FontId, Painter, Rect, RichText, Role, Sense, Slider, Stroke, Ui,
-    UiBuilder, WidgetInfo, pos2, vec2,
+    self, Align2, Button, Color32, DragValue, FontId, Painter, Popup, PopupCloseBehavior, Rect, RichText, Role, Sense,
+    Stroke, Ui, UiBuilder, WidgetInfo, pos2, vec2,
 };
 use strum::IntoEnumIterator as _;
 
 use super::layers::{RESIDUAL_MAP, reason_rgb};
 use super::{Memory, build, steps};
 use crate::app::keys::ImprintSource;
-use crate::app::settings::{LayerLook, LayerSize, SceneLayer, SceneLook};
+use crate::app::settings::SceneLayer;
 use crate::app::workbench::Layer;
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{SMALL, caption};
@@ -35,21 +34,15 @@ struct Row {
     text: String,
 }
 
-/// The list at the lower left corner of the `first` view, folded to its colors until somebody asks; and the bar of the
-/// color map at the lower right one.
-pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, source: ImprintSource, rect: Rect, first: bool) {
-    if first && memory.legend_open {
-        unfolded(cx, ui, memory, source, rect);
-    } else if first {
-        folded(cx, ui, memory, source, rect);
+/// The list at the lower left corner of the `first` view; and the bar of the color map at the lower right one.
+pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &Memory, source: ImprintSource, rect: Rect, first: bool) {
+    if first {
+        list(cx, ui, memory, source, rect);
     }
     let painted = memory.layer_colors[source as usize].is_some();
     match cx.state.workbench.layer {
         Layer::Residuals if painted => residuals(cx, &ui.painter_at(rect), source, rect),
-        Layer::Distance if painted => {
-            histogram(cx, &ui.painter_at(rect), memory, source, rect);
-            distances(cx, ui, &source.name().to_lowercase(), "inside ", rect);
-        }
+        Layer::Distance if painted => distances(cx, ui, source, rect),
         Layer::Distance if results::pose(cx.state, source).shown().is_some() => {
             let font = FontId::proportional(11.0);
             let at = bar(rect).right_top();
@@ -59,69 +52,32 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, source: Im
     }
 }
 
-/// The colors of what is drawn, in a row; a click unfolds the list.
-fn folded(cx: &Cx<'_>, ui: &mut Ui, memory: &mut Memory, source: ImprintSource, rect: Rect) {
+/// The colors of what is drawn, in a row; a click opens the list of names with their switches.
+fn list(cx: &mut Cx<'_>, ui: &mut Ui, memory: &Memory, source: ImprintSource, rect: Rect) {
     const DOT: f32 = 11.0;
-    let shown = |row: &Row| row.layer.is_none_or(|layer| cx.state.settings.scene.layer(layer).shown);
-    let rows: Vec<Row> = rows(cx, memory, source).into_iter().filter(shown).collect();
-    let size = vec2(DOT * rows.len() as f32 + 8.0, 18.0);
+    let rows = rows(cx, memory, source);
+    let shown = |row: &&Row| row.layer.is_none_or(|layer| cx.state.settings.scene.shows(layer));
+    let drawn: Vec<&Row> = rows.iter().filter(shown).collect();
+    let size = vec2(DOT * drawn.len() as f32 + 8.0, 18.0);
     let place = Rect::from_min_size(pos2(rect.left() + 6.0, rect.bottom() - 6.0 - size.y), size);
     let response = ui.interact(place, ui.scope_id().with("legend"), Sense::click());
     response.widget_info(|| WidgetInfo::labeled(Role::Button, true, "Legend"));
     let fill = if response.hovered() { cx.p.control[1] } else { cx.p.canvas.gamma_multiply(0.6) };
     ui.painter().rect_filled(place, 9.0, fill);
-    for (i, row) in rows.iter().enumerate() {
+    for (i, row) in drawn.iter().enumerate() {
         let center = place.left_center() + vec2(4.0 + DOT * (i as f32 + 0.5), 0.0);
         ui.painter().circle_filled(center, 3.5, row.color);
     }
-    let clicked = response.clicked();
-    response.on_hover_ui(|ui| {
-        ui.label(RichText::new("Click to show or hide things and change their colors").size(SMALL));
-        for row in &rows {
+    let response = response.on_hover_ui(|ui| {
+        ui.label(RichText::new("Click to show or hide things").size(SMALL));
+        for row in &drawn {
             ui.label(RichText::new(&row.text).size(SMALL).color(row.color));
         }
     });
-    memory.legend_open |= clicked;
-}
-
-/// The whole list, with its switches.
-fn unfolded(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, source: ImprintSource, rect: Rect) {
-    let rows = rows(cx, memory, source);
-    // A small pane keeps its picture.
-    let most = ((rect.height() * 0.6) / ROW).floor().max(1.0) as usize;
-    let height = (rows.len().min(most) + 1) as f32 * ROW;
-    let place = Rect::from_min_size(pos2(rect.left() + 6.0, rect.bottom() - 6.0 - height), vec2(WIDTH, height));
-    ui.painter().rect_filled(place.expand(2.0), 3.0, cx.p.canvas.gamma_multiply(0.6));
-    let builder = UiBuilder::new().max_rect(place).id_salt("legend");
-    ui.scope_builder(builder, |ui| {
-        ui.spacing_mut().item_spacing = vec2(2.0, 0.0);
-        ui.spacing_mut().interact_size.y = ROW;
-        ui.spacing_mut().button_padding = vec2(2.0, 0.0);
-        let fold = Button::new(RichText::new("Fold").size(SMALL).color(cx.p.weak)).frame(false);
-        if ui.add(fold.min_size(vec2(0.0, ROW))).on_hover_text("Collapses the legend").clicked() {
-            memory.legend_open = false;
-        }
-        for row in rows.into_iter().take(most) {
-            line(cx, ui, source, &row);
-        }
+    Popup::menu(&response).close_behavior(PopupCloseBehavior::CloseOnClickOutside).show(|ui| {
+        ui.spacing_mut().item_spacing.y = 0.0;
+        rows.iter().for_each(|row| line(cx, ui, source, row));
     });
-}
-
-/// Histogram of the contact points by distance, above the bar of their colors.
-fn histogram(cx: &Cx<'_>, painter: &Painter, memory: &Memory, source: ImprintSource, rect: Rect) {
-    const HIGH: f32 = 26.0;
-    let Some(counts) = memory.layer_colors[source as usize].as_ref().and_then(|colors| colors.histogram) else {
-        return;
-    };
-    let (bar, most) = (bar(rect), counts.iter().copied().max().unwrap_or(0).max(1) as f32);
-    let wide = bar.width() / counts.len() as f32;
-    let foot = bar.top() - 22.0;
-    for (i, count) in counts.iter().enumerate() {
-        let left = bar.left() + wide * i as f32;
-        let high = HIGH * *count as f32 / most;
-        let column = Rect::from_min_max(pos2(left, foot - high), pos2(left + wide - 0.5, foot));
-        painter.rect_filled(column, 0.0, cx.p.weak);
-    }
 }
 
 /// Rows for everything that is drawn, or could be.
@@ -132,8 +88,7 @@ fn rows(cx: &Cx<'_>, memory: &Memory, source: ImprintSource) -> Vec<Row> {
         rows.push(Row { layer: Some(layer), color: build::color(cx, source, layer), text: text.to_owned() });
     };
     if memory.clouds[source as usize].is_some() {
-        add(SceneLayer::Membrane, "membrane, points");
-        add(SceneLayer::Surface, "membrane, surface");
+        add(SceneLayer::Membrane, "membrane");
         add(SceneLayer::Contact, "contact points");
     }
     if state.workbench.both_clouds {
@@ -145,11 +100,8 @@ fn rows(cx: &Cx<'_>, memory: &Memory, source: ImprintSource) -> Vec<Row> {
             add(layer, model_name(cx, source, layer));
         }
     }
-    let pins = steps::legend_entries(cx, source);
-    let pinned = state.settings.scene.layer(SceneLayer::Pins).color.is_none();
-    for (i, (color, text)) in pins.into_iter().enumerate() {
-        let color = if pinned { color } else { build::color(cx, source, SceneLayer::Pins) };
-        rows.push(Row { layer: (i == 0).then_some(SceneLayer::Pins), color, text: text.to_owned() });
+    if let Some((color, about)) = steps::legend(cx, memory, source) {
+        rows.push(Row { layer: None, color, text: about.to_owned() });
     }
     if state.workbench.layer == Layer::Reasons
         && memory.layer_colors[source as usize].is_some()
@@ -179,80 +131,24 @@ fn model_name(cx: &Cx<'_>, source: ImprintSource, layer: SceneLayer) -> &'static
     }
 }
 
-/// A swatch that switches, the name, and a menu for the rest.
+/// A swatch and the name; a click shows or hides it.
 fn line(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, row: &Row) {
-    let scene = &cx.state.settings.scene;
-    let look = row.layer.map(|layer| scene.layer(layer));
-    let shown = look.is_none_or(|look| look.shown);
-    ui.horizontal(|ui| {
-        ui.set_height(ROW);
-        let sense = if look.is_some() { Sense::click() } else { Sense::hover() };
-        let (dot, swatch) = ui.allocate_exact_size(vec2(16.0, ROW), sense);
-        if shown {
-            ui.painter().circle_filled(dot.center(), 4.5, row.color);
-        } else {
-            ui.painter().circle_stroke(dot.center(), 4.0, Stroke::new(1.5, row.color));
-        }
-        let color = if shown { cx.p.text } else { cx.p.weak };
-        let Some((layer, look)) = row.layer.zip(look) else {
-            ui.label(RichText::new(&row.text).size(SMALL).color(color));
-            return;
-        };
-        let name = format!("{}, {}", row.text, source.name().to_lowercase());
-        swatch.widget_info(|| WidgetInfo::selected(Role::CheckBox, true, shown, format!("Show {name}")));
-        let text = Button::new(RichText::new(&row.text).size(SMALL).color(color)).frame(false).min_size(vec2(0.0, ROW));
-        let text = ui.add(text).on_hover_text("Show or hide; the dots at the right change color, size and opacity");
-        if swatch.clicked() || text.clicked() {
-            cx.push(prefer(move |s| s.scene.set(layer, LayerLook { shown: !shown, ..look })));
-        }
-        let dots = Button::new(RichText::new("…").size(SMALL).color(cx.p.weak)).frame(false);
-        let (menu, _) = MenuButton::from_button(dots).ui(ui, |ui| {
-            if let Some(changed) = change(ui, row, layer, look, cx.p.weak) {
-                cx.push(prefer(move |s| s.scene.set(layer, changed)));
-            }
-        });
-        menu.accessible_name(format!("Look of {name}"));
-    });
-}
-
-/// Color, size and opacity of a layer; what was changed.
-fn change(ui: &mut Ui, row: &Row, layer: SceneLayer, look: LayerLook, weak: Color32) -> Option<LayerLook> {
-    let mut new = look;
-    ui.set_min_width(190.0);
-    if layer != SceneLayer::Guides {
-        ui.horizontal(|ui| {
-            let mut rgb = [row.color.r(), row.color.g(), row.color.b()];
-            if ui.color_edit_button_srgb(&mut rgb).changed() {
-                new.color = Some(rgb);
-            }
-            ui.label("Color");
-            if ui.add_enabled(new.color.is_some(), Button::new("Theme's").small()).clicked() {
-                new.color = None;
-            }
-        });
-        ui.add(Slider::new(&mut new.opacity, 0.05..=1.0).fixed_decimals(2).text("opacity"));
+    let shown = row.layer.is_none_or(|layer| cx.state.settings.scene.shows(layer));
+    let color = if shown { cx.p.text } else { cx.p.weak };
+    let text = Button::new(RichText::new(format!("      {}", row.text)).size(SMALL).color(color)).frame(false);
+    let button = ui.add(text.min_size(vec2(WIDTH, ROW)));
+    let dot = pos2(button.rect.left() + 8.0, button.rect.center().y);
+    if shown {
+        ui.painter().circle_filled(dot, 4.5, row.color);
+    } else {
+        ui.painter().circle_stroke(dot, 4.0, Stroke::new(1.5, row.color));
     }
-    if layer.has_size() {
-        let mut value = new.size.value();
-        let unit = if matches!(new.size, LayerSize::Px(_)) { " px" } else { " mm" };
-        ui.add(Slider::new(&mut value, LayerSize::RANGE).logarithmic(true).fixed_decimals(1).suffix(unit).text("size"));
-        new.size = new.size.with(value);
-        if layer.has_points() {
-            ui.horizontal(|ui| {
-                ui.label(RichText::new("Size in").color(weak));
-                for (name, size) in [("pixels", LayerSize::Px(2.0)), ("millimeters", LayerSize::Mm(0.4))] {
-                    let same = std::mem::discriminant(&size) == std::mem::discriminant(&new.size);
-                    if ui.selectable_label(same, name).clicked() && !same {
-                        new.size = size;
-                    }
-                }
-            });
-        }
+    let Some(layer) = row.layer else { return };
+    let name = format!("Show {}, {}", row.text, source.name().to_lowercase());
+    button.widget_info(|| WidgetInfo::selected(Role::CheckBox, true, shown, &name));
+    if button.on_hover_text("Show or hide").clicked() {
+        cx.push(prefer(move |s| s.scene.toggle(layer)));
     }
-    if ui.add_enabled(new != layer.preset(), Button::new("Reset")).clicked() {
-        new = layer.preset();
-    }
-    (new != look).then_some(new)
 }
 
 /// The place of the bar.
@@ -290,18 +186,16 @@ fn residuals(cx: &Cx<'_>, painter: &Painter, source: ImprintSource, rect: Rect) 
     }
 }
 
-/// Bar of the signed distances' colors, `below` being what negative ones are called; the reach is one for all views,
-/// and can be changed.
-pub(crate) fn distances(cx: &mut Cx<'_>, ui: &mut Ui, view: &str, below: &str, rect: Rect) {
-    let bar = bar(rect);
+/// Bar of the signed distances' colors; the reach is one for all views, and can be changed.
+fn distances(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: Rect) {
+    let (bar, view) = (bar(rect), source.name().to_lowercase());
     let painter = ui.painter_at(rect);
     colors(&painter, bar, DISTANCE_MAP);
-    let look: &SceneLook = &cx.state.settings.scene;
-    let mut mm = units::mm(f64::from(look.distance_m));
-    let texts = [format!("{below}-{mm:.2}"), "0".into(), format!("+{mm:.2} mm")];
+    let mut mm = units::mm(f64::from(cx.state.settings.scene.distance_m));
+    let texts = [format!("inside -{mm:.2}"), "0".into(), format!("+{mm:.2} mm")];
     ends(&painter, bar, texts, cx.p.text);
     let place = Rect::from_min_max(pos2(bar.left(), bar.top() - 20.0), pos2(bar.right(), bar.top() - 2.0));
-    let builder = UiBuilder::new().max_rect(place).id_salt(("distances", view));
+    let builder = UiBuilder::new().max_rect(place).id_salt(("distances", &view));
     ui.scope_builder(builder, |ui| {
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
             let drag =

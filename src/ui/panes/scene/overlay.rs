@@ -25,18 +25,17 @@ use touch2touch_pipeline::steps::pose::PoseResult;
 pub(super) fn show(
     cx: &mut Cx<'_>,
     ui: &mut Ui,
-    memory: &mut Memory,
+    memory: &Memory,
     source: ImprintSource,
     output: &SceneOutput,
     first: bool,
 ) {
     let rect = output.response.rect;
     let camera = memory.views[source as usize].camera;
-    if cx.state.settings.scene.layer(SceneLayer::Guides).shown {
+    if cx.state.settings.scene.shows(SceneLayer::Guides) {
         axes_and_scale(cx.p, &ui.painter_at(rect), &camera, output, rect);
     }
     legend::show(cx, ui, memory, source, rect, first);
-    super::steps::show_legend(cx, ui, memory, source, rect);
 }
 
 /// Angle and figures of the step shown, where that is not the registered pose.

@@ -1,161 +1,96 @@
-//! Additions of the time machine to a 3D view: the CAD model at the step shown, correspondences, pinned steps.
+//! Additions of a registration's steps to a 3D view: the CAD model at the step shown, lines to the counterparts.
 
 use std::sync::Arc;
 
-use eframe::egui::{Align2, Color32, FontId, Rect, Ui, pos2, vec2};
+use eframe::egui::Color32;
 use glam::{DAffine3, DVec3};
 
 use super::Memory;
 use crate::app::inspect::Inspected;
 use crate::app::keys::{ImprintSource, Inspection};
 use crate::app::results;
-use crate::app::settings::SceneLayer;
 use crate::app::workbench::Layer;
 use crate::gpu::lines::{LinesItem, LinesStyle, Segment};
-use crate::gpu::mesh::{MeshItem, Shading};
 use crate::gpu::scene::SceneData;
 use crate::ui::parts::cx::Cx;
-use crate::ui::parts::theme::{DARK, Palette};
-use crate::ui::parts::widget::colorbar::gradient;
-use touch2touch_core::colormap::ColorMap;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::units;
 
-/// Correspondences drawn at most: more hide each other.
+/// Lines drawn at most: more hide each other.
 const MOST_LINES: usize = 300;
 /// Shorter ones are specks on the model, not lines, meters.
 const SHORTEST_M: f64 = 0.000_3;
-/// The residual of the last color, millimeters; larger ones have it too.
-const RESIDUAL_MM: f32 = 4.0;
-/// Opacity of a correspondence that weighs nothing, and what full weight adds to it.
+/// Opacity of a line that weighs nothing, and what full weight adds to it.
 const OPACITY: [f64; 2] = [0.2, 0.8];
 
-/// The correspondences of one step as the renderer takes them.
+/// The lines of one step as the renderer takes them.
 pub(super) struct StepLines {
-    of: Arc<Inspection>,
-    run: usize,
-    at: usize,
-    dark: bool,
+    of: (Arc<Inspection>, usize, usize),
+    color: Color32,
     revision: u64,
     segments: Arc<[Segment]>,
-    /// Correspondences shown, and contact points there are.
-    shown: [usize; 2],
-    /// Median and largest residual of those shown, meters.
-    residual_m: Option<[f64; 2]>,
+    /// Their median and largest length in words.
+    about: String,
 }
 
-/// The pose at which the step shown has the CAD model, if the time machine looks at this side.
+/// The pose at which the step shown has the CAD model, if the pane of the steps looks at this side.
 pub(super) fn pose(cx: &Cx<'_>, source: ImprintSource) -> Option<PlanarPose> {
     results::inspected_in(cx.state, source).map(|shown| shown.step.grasp_from_object)
 }
 
 /// Makes the lines of the step shown, once per step.
 pub(super) fn update(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource) {
+    if cx.state.workbench.layer != Layer::Correspondences {
+        return;
+    }
     let Some(Inspected { inspection, run, at, step }) = results::inspected_in(cx.state, source) else { return };
     let Some(tool) = results::tool(cx.state).ready() else { return };
-    let dark = *cx.p == DARK;
-    let same = |l: &StepLines| Arc::ptr_eq(&l.of, inspection) && (l.run, l.at, l.dark) == (run, at, dark);
+    let color = cx.p.accent;
+    let same = |l: &StepLines| Arc::ptr_eq(&l.of.0, inspection) && (l.of.1, l.of.2, l.color) == (run, at, color);
     if memory.step_lines.as_ref().is_some_and(same) {
         return;
     }
     let matches = inspection.counterparts.at(&inspection.points, &tool.model, step, MOST_LINES);
     let segments = matches.list.iter().filter(|m| m.residual_m > SHORTEST_M).filter_map(|m| {
         let from = *inspection.points.get(m.point)?;
-        let [r, g, b, _] = residual_color(cx.p, m.residual_m).to_array();
         let alpha = (255.0 * (OPACITY[0] + OPACITY[1] * m.weight)) as u8;
         // The registration is planar: the counterpart has the point's own x.
-        Some(Segment { ends: [from, DVec3::new(from.x, m.foot_yz.x, m.foot_yz.y)], rgba: [r, g, b, alpha] })
+        let ends = [from, DVec3::new(from.x, m.foot_yz.x, m.foot_yz.y)];
+        Some(Segment { ends, rgba: [color.r(), color.g(), color.b(), alpha] })
+    });
+    let lengths = matches.median_and_max_m().map_or(String::new(), |[median, max]| {
+        format!(", {} (median), {} (largest)", units::text_mm(median), units::text_mm(max))
     });
     memory.revision += 1;
     memory.step_lines = Some(StepLines {
-        of: inspection.clone(),
-        run,
-        at,
-        dark,
+        of: (inspection.clone(), run, at),
+        color,
         revision: memory.revision,
         segments: segments.collect(),
-        shown: [matches.list.len(), matches.of],
-        residual_m: matches.median_and_max_m(),
+        about: format!("pull lines of {} in {} points{lengths}", matches.list.len(), matches.of),
     });
 }
 
 /// The lines of a side, if they are to be drawn.
 fn lines<'a>(cx: &Cx<'_>, memory: &'a Memory, source: ImprintSource) -> Option<&'a StepLines> {
-    let on = cx.state.inspect.lines || cx.state.workbench.layer == Layer::Correspondences;
+    let on = cx.state.workbench.layer == Layer::Correspondences;
     let shown = results::inspected_in(cx.state, source).filter(|_| on)?;
-    memory.step_lines.as_ref().filter(|l| Arc::ptr_eq(&l.of, shown.inspection))
+    memory.step_lines.as_ref().filter(|lines| Arc::ptr_eq(&lines.of.0, shown.inspection))
 }
 
-/// Adds correspondences and pinned steps.
+/// The color and the words of the lines, for the legend.
+pub(super) fn legend<'a>(cx: &Cx<'_>, memory: &'a Memory, source: ImprintSource) -> Option<(Color32, &'a str)> {
+    lines(cx, memory, source).map(|lines| (lines.color, lines.about.as_str()))
+}
+
+/// Adds the lines of the step shown.
 pub(super) fn add(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, scene: &mut SceneData) {
     if let Some(lines) = lines(cx, memory, source) {
         scene.lines.push(LinesItem {
-            name: "correspondences".into(),
+            name: "pull lines".into(),
             revision: lines.revision,
             segments: lines.segments.clone(),
             style: LinesStyle { world_from_lines: DAffine3::IDENTITY, width_px: 1.5, opacity: 1.0, overlay: true },
         });
     }
-    let Some(mesh) = &memory.mesh else { return };
-    let look = cx.state.settings.scene.layer(SceneLayer::Pins);
-    for (i, pin) in pins(cx, source).filter(|_| look.shown) {
-        scene.meshes.push(MeshItem {
-            name: format!("CAD at pin {i}"),
-            revision: mesh.revision,
-            mesh: mesh.mesh.clone(),
-            shading: Shading::Smooth,
-            values: Arc::default(),
-            style: super::layers::outline(pin.to_affine(), cx.p.pins[i], look),
-        });
-    }
-}
-
-/// Number and pose of the pins of a side.
-fn pins(cx: &Cx<'_>, source: ImprintSource) -> impl Iterator<Item = (usize, PlanarPose)> {
-    let pins = cx.state.inspect.pins_of(cx.state.pair_key()).into_iter().enumerate();
-    pins.filter_map(move |(i, pin)| pin.filter(|p| p.source == source).map(|p| (i, p.grasp_from_object)))
-}
-
-/// Colors and names of the pins of a side, for the legend.
-pub(super) fn legend_entries(cx: &Cx<'_>, source: ImprintSource) -> Vec<(Color32, &'static str)> {
-    pins(cx, source).map(|(i, _)| (cx.p.pins[i], ["CAD, step A", "CAD, step B"][i])).collect()
-}
-
-/// The color of a residual. The end of the map that would vanish before the background is left out.
-fn residual_color(p: &Palette, residual_m: f64) -> Color32 {
-    color_at(p, units::mm(residual_m) as f32 / RESIDUAL_MM)
-}
-
-fn color_at(p: &Palette, share: f32) -> Color32 {
-    let share = share.clamp(0.0, 1.0);
-    let [r, g, b] = ColorMap::Viridis.rgb8(if *p == DARK { 0.3 + 0.7 * share } else { 0.8 - 0.8 * share });
-    Color32::from_rgb(r, g, b)
-}
-
-/// Legend of the lines' colors, with their numbers.
-pub(super) fn show_legend(cx: &Cx<'_>, ui: &Ui, memory: &Memory, source: ImprintSource, rect: Rect) {
-    let Some(lines) = lines(cx, memory, source) else { return };
-    let painter = ui.painter_at(rect);
-    let font = FontId::proportional(11.0);
-    let (width, left) = (110.0, rect.left() + 176.0);
-    let beside = if cx.state.workbench.layer != Layer::None { 440.0 } else { 310.0 };
-    if rect.width() < width + beside {
-        return;
-    }
-    let bar = Rect::from_min_size(pos2(left, rect.bottom() - 38.0), vec2(width, 6.0));
-    gradient(&painter, bar, 16, |share| color_at(cx.p, share));
-    let y = bar.bottom() + 2.0;
-    painter.text(pos2(bar.left(), y), Align2::LEFT_TOP, "0", font.clone(), cx.p.weak);
-    let end = format!("{RESIDUAL_MM:.0} mm residual");
-    painter.text(pos2(bar.right(), y), Align2::RIGHT_TOP, end, font.clone(), cx.p.weak);
-    let [shown, of] = lines.shown;
-    let points =
-        if shown == of { format!("{of} points") } else { format!("1 of {} points", of.div_ceil(shown.max(1))) };
-    let text = match lines.residual_m {
-        Some([median, max]) => {
-            format!("{points}: residual {} (median), {} (largest)", units::text_mm(median), units::text_mm(max))
-        }
-        None => points,
-    };
-    painter.text(pos2(bar.left(), bar.top() - 3.0), Align2::LEFT_BOTTOM, text, font, cx.p.weak);
 }

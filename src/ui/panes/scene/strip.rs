@@ -1,11 +1,10 @@
-//! The strip beside the 3D views: views, what is shown, what is measured.
+//! The strip beside the 3D views: views, what is shown, tools.
 
 use eframe::egui::{self, Popup, PopupCloseBehavior, Rect, Ui, UiBuilder, vec2};
 use strum::IntoEnumIterator as _;
 
 use crate::app::action::Action;
 use crate::app::command::{Command, Pane};
-use crate::app::settings::SceneLayer;
 use crate::app::workbench::{Layer, SceneTool, WorkbenchCommand};
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::caption;
@@ -33,7 +32,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, column: Rect) {
     ui.scope_builder(builder, |ui| {
         ui.set_clip_rect(column.intersect(ui.clip_rect()));
         // In a low pane the buttons are lower, so that all are there.
-        const BUTTONS: f32 = 9.0;
+        const BUTTONS: f32 = 6.0;
         ui.spacing_mut().item_spacing.y = 2.0;
         ui.spacing_mut().interact_size.y = ((column.height() - 18.0) / BUTTONS - 2.0).clamp(18.0, icon::SIZE.y);
         views(cx, ui);
@@ -42,8 +41,6 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, column: Rect) {
         switch(cx, ui, Icon::Distance, Action::Distances, layer == Layer::Distance);
         shown(cx, ui);
         line(cx, ui);
-        switch(cx, ui, Icon::Ruler, Action::MeasureDistance, tool == SceneTool::Distance);
-        switch(cx, ui, Icon::Angle, Action::MeasureAngle, tool == SceneTool::Angle);
         switch(cx, ui, Icon::Hand, Action::PoseTool, tool == SceneTool::Pose);
         if cx.state.selection.panes.contains(&Pane::Masks) {
             switch(cx, ui, Icon::BrushIn3d, Action::PaintIn3d, tool == SceneTool::Paint);
@@ -84,8 +81,6 @@ fn views(cx: &mut Cx<'_>, ui: &mut Ui) {
         ui.separator();
         let settings = &cx.state.settings;
         cx.menu_row(ui, Action::Parallel, settings.scene.orthographic);
-        cx.menu_row(ui, Action::LinkCameras, settings.cameras_linked);
-        cx.menu_row(ui, Action::CopyCamera, false);
     });
 }
 
@@ -99,28 +94,12 @@ fn shown(cx: &mut Cx<'_>, ui: &mut Ui) {
         ui.set_min_width(210.0);
         ui.label(caption("Color the contact points by", cx.p));
         for layer in Layer::iter() {
-            let text = match layer {
-                Layer::None => "one color",
-                Layer::Residuals => "residuals, mm",
-                Layer::Reasons => "pixels used and left out",
-                Layer::Distance => "signed distance, mm",
-                Layer::Correspondences => "pull lines to the model",
-            };
-            if ui.radio(layer == painted, text).on_hover_text(layer.tooltip()).clicked() {
+            if ui.radio(layer == painted, layer.name()).on_hover_text(layer.tooltip()).clicked() {
                 cx.push(Command::Workbench(WorkbenchCommand::SetLayer(layer)));
             }
         }
         ui.separator();
-        let scene = &cx.state.settings.scene;
-        let (window, surface, edl) = (scene.only_window, scene.layer(SceneLayer::Surface).shown, scene.eye_dome);
-        let both = cx.state.workbench.both_clouds;
-        for (action, on) in [
-            (Action::WindowOnly, window),
-            (Action::BothClouds, both),
-            (Action::MembraneSurface, surface),
-            (Action::EyeDome, edl),
-        ] {
-            cx.menu_row(ui, action, on);
-        }
+        cx.menu_row(ui, Action::WindowOnly, cx.state.settings.scene.only_window);
+        cx.menu_row(ui, Action::BothClouds, cx.state.workbench.both_clouds);
     });
 }

@@ -2,7 +2,7 @@
 
 use crate::app::results;
 use crate::app::settings::prefer;
-use eframe::egui::{Align, Button, Color32, FontId, Layout, RichText, Sense, Ui, UiBuilder, vec2};
+use eframe::egui::{Align, Button, Color32, Layout, RichText, Sense, Ui, UiBuilder, vec2};
 
 use super::hands;
 use super::overlay::{difference, lower_first, pose_details, pose_time, step_text};
@@ -35,9 +35,9 @@ fn lacks_contact(state: &State, source: ImprintSource) -> bool {
     }
 }
 
-/// The line; takes its height from the top of the pane.
-pub(super) fn line(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
-    let (text, color, mut details) = said(cx, source);
+/// The line; takes its height from the top of the pane. What mends both sides is offered on the `first`.
+pub(super) fn line(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, first: bool) {
+    let (text, color, details) = said(cx, source);
     let width = ui.available_width();
     let (rect, response) = ui.allocate_exact_size(vec2(width, HEIGHT), Sense::hover());
     ui.painter().rect_filled(rect, 0.0, cx.p.frame);
@@ -62,7 +62,7 @@ pub(super) fn line(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
     }
     // The CAD model is in another unit: it is said in which, and that is all.
     let units = match results::pose(cx.state, source) {
-        Lookup::Failed(err) => err.units.clone(),
+        Lookup::Failed(err) if first => err.units.clone(),
         _ => None,
     };
     if let Some(offer) = units {
@@ -79,33 +79,14 @@ pub(super) fn line(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
     }
     ui.scope_builder(UiBuilder::new().max_rect(inner), |ui| {
         ui.set_clip_rect(inner.intersect(ui.clip_rect()));
-        let shown = fitting(ui, &text);
-        if shown != text {
-            details.insert(0, text);
-        }
-        ui.add(eframe::egui::Label::new(RichText::new(shown).size(LINE).color(color)).truncate());
+        ui.add(eframe::egui::Label::new(RichText::new(&text).size(LINE).color(color)).truncate());
     });
-    if !details.is_empty() {
-        response.on_hover_ui(|ui| {
-            for line in details {
-                ui.label(RichText::new(line).size(SMALL));
-            }
-        });
-    }
-}
-
-/// The parts of the line that fit beside each other, from the first on: a whole part less is better than half a word.
-fn fitting(ui: &Ui, text: &str) -> String {
-    let width = |text: &str| {
-        let galley = ui.painter().layout_no_wrap(text.to_owned(), FontId::proportional(LINE), Color32::WHITE);
-        galley.size().x
-    };
-    let mut text = text;
-    while width(text) > ui.available_width() {
-        let Some((kept, _)) = text.rsplit_once(" · ") else { break };
-        text = kept;
-    }
-    text.to_owned()
+    response.on_hover_ui(|ui| {
+        // What is cut off stands there whole.
+        for line in std::iter::once(text).chain(details) {
+            ui.label(RichText::new(line).size(SMALL));
+        }
+    });
 }
 
 /// The line, its color, and what there is besides.
@@ -118,15 +99,9 @@ fn said(cx: &Cx<'_>, source: ImprintSource) -> (String, Color32, Vec<String>) {
         Lookup::Ready(pose) | Lookup::Stale(pose) => {
             let angle = pose.angle_text();
             let (mut text, color) = match &pose.verdict {
-                Some(verdict) => {
-                    let why = if verdict.grade > Grade::Good { format!(": {}", verdict.why) } else { String::new() };
-                    (format!("{angle} · {}{why}", verdict.grade), grade_color(cx.p, verdict.grade))
-                }
+                Some(verdict) => (format!("{} · {angle}", verdict.grade), grade_color(cx.p, verdict.grade)),
                 None => (angle, cx.p.strong),
             };
-            if results::provisional_pose(state, source).is_some() {
-                text += " · checking…";
-            }
             let mut details: Vec<String> = Vec::new();
             if let Some(verdict) = &pose.verdict {
                 details.push(format!("{}: {}", verdict.grade, verdict.why));
@@ -137,6 +112,9 @@ fn said(cx: &Cx<'_>, source: ImprintSource) -> (String, Color32, Vec<String>) {
                 let off = PoseDifference::between(pose.grasp_from_object, truth);
                 text += &format!(" · {}", difference("off by", "", off));
                 details.extend(pose.truth_rad.map(|truth| format!("true angle {}", units::text_deg(truth))));
+            }
+            if let Some(verdict) = pose.verdict.as_ref().filter(|verdict| verdict.grade > Grade::Good) {
+                text += &format!(" · {}", verdict.why);
             }
             if results::sample(state).ready().is_some_and(|sample| sample.scale == Scale::Assumed) {
                 text += " · assumed camera";
@@ -155,8 +133,8 @@ fn said(cx: &Cx<'_>, source: ImprintSource) -> (String, Color32, Vec<String>) {
             details.push(difference("Pose by hand: error", "", off));
         }
     }
-    if let Some(apart) = results::sides_apart(state) {
-        details.push(difference("Measured vs predicted:", "apart", apart));
+    if let Some(between) = results::sides_apart(state) {
+        details.push(difference("Measured vs predicted:", "apart", between));
     }
     (text, color, details)
 }

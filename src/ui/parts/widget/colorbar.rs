@@ -1,8 +1,7 @@
 //! The bar that says which color is which value: numbers, unit, histogram, and a range that can be changed.
 
 use eframe::egui::{
-    self, Align2, Color32, FontId, Mesh, Painter, PointerButton, Rect, Role, Sense, Shape, Stroke, Ui, WidgetInfo,
-    pos2, vec2,
+    self, Align2, Color32, FontId, Mesh, Painter, Rect, Role, Sense, Shape, Stroke, Ui, WidgetInfo, pos2, vec2,
 };
 
 use crate::ui::parts::theme::{Palette, SMALL};
@@ -13,9 +12,6 @@ use touch2touch_core::colormap::{ColorMap, Range};
 pub(crate) const HEIGHT: f32 = 36.0;
 /// Width of the numbers at the ends, points.
 const END: f32 = 42.0;
-/// From this width on the buttons stand beside the bar instead of in a menu, points.
-const WIDE: f32 = 340.0;
-
 /// A bar to be shown. Values are in millimeters.
 pub(crate) struct Colorbar<'a> {
     /// The name for screen readers and tests, e.g. `Depth range`.
@@ -30,8 +26,6 @@ pub(crate) struct Colorbar<'a> {
     pub histogram: Option<&'a Histogram>,
     /// True where the range stays when another sample is shown; `None` shows no lock.
     pub locked: Option<bool>,
-    /// Beside the unit, e.g. `assumed scale`.
-    pub note: &'a str,
     /// Tooltips of the button that sets the range from what is shown, and of the lock.
     pub tips: [String; 2],
 }
@@ -55,41 +49,19 @@ impl Colorbar<'_> {
         ui.allocate_ui(vec2(ui.available_width(), HEIGHT), |ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
             ui.horizontal_centered(|ui| {
-                let wide = ui.available_width() >= WIDE;
                 let mut edited = range;
                 let lo = end(ui, &mut edited.lo, &format!("{}, lower end", self.label));
-                // In a narrow pane the note stands on the picture alone: the colors need the room.
-                let noted = wide && !self.note.is_empty();
-                let note = if noted { 80.0 } else { 0.0 };
-                let buttons = match (wide, self.locked.is_some()) {
-                    (true, true) => 76.0,
-                    (true, false) => 40.0,
-                    (false, _) => 22.0,
-                };
-                let width = (ui.available_width() - END - 26.0 - buttons - note - 8.0).max(24.0);
+                let width = (ui.available_width() - END - 56.0).max(24.0);
                 if let Some(new) = self.gradient(ui, width, range, p) {
                     asked = Some(ColorbarChange::Range(new));
                 }
                 let hi = end(ui, &mut edited.hi, &format!("{}, upper end", self.label));
                 ui.label(egui::RichText::new("mm").size(SMALL).color(p.weak));
-                if noted {
-                    ui.add(egui::Label::new(egui::RichText::new(self.note).size(SMALL).color(p.caution)))
-                        .on_hover_text("Pictures carry no scale: millimeters are assumed");
-                }
-                if wide {
-                    asked = self.buttons(ui).or(asked);
-                } else {
-                    let more = egui::Button::new(egui::RichText::new("…").size(SMALL)).min_size(vec2(18.0, 18.0));
-                    let (more, inner) =
-                        egui::containers::menu::MenuButton::from_button(more).ui(ui, |ui| self.buttons(ui));
-                    let more = more.accessible_name(format!("{}: more", self.label));
-                    more.on_hover_text(if self.locked == Some(false) {
-                        "Range: not kept"
-                    } else {
-                        "Range: automatic, keep"
-                    });
-                    asked = inner.and_then(|i| i.inner).or(asked);
-                }
+                let more = egui::Button::new(egui::RichText::new("…").size(SMALL)).min_size(vec2(18.0, 18.0));
+                let (more, inner) = egui::containers::menu::MenuButton::from_button(more).ui(ui, |ui| self.buttons(ui));
+                let kept = if self.locked == Some(false) { ", now fitted to each pair" } else { "" };
+                more.accessible_name(format!("{}: more", self.label)).on_hover_text(format!("Fit, keep{kept}"));
+                asked = inner.and_then(|i| i.inner).or(asked);
                 if lo || hi {
                     if self.symmetric {
                         let size = if lo { edited.lo } else { edited.hi };
@@ -122,9 +94,9 @@ impl Colorbar<'_> {
         asked
     }
 
-    /// The colors with histogram and ticks; dragging a half moves its end, a double-click resets.
+    /// The colors with histogram and ticks; a double-click resets.
     fn gradient(&self, ui: &mut Ui, width: f32, range: Range, p: &Palette) -> Option<Range> {
-        let (rect, response) = ui.allocate_exact_size(vec2(width, HEIGHT - 4.0), Sense::click_and_drag());
+        let (rect, response) = ui.allocate_exact_size(vec2(width, HEIGHT - 4.0), Sense::click());
         let info = format!("{} {:.2} to {:.2} mm", self.label, range.lo, range.hi);
         response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &info));
         let bar = Rect::from_min_max(pos2(rect.left(), rect.top() + 10.0), pos2(rect.right(), rect.top() + 19.0));
@@ -148,29 +120,8 @@ impl Colorbar<'_> {
             let text = if v.fract().abs() < 1e-3 { format!("{v:.0}") } else { format!("{v:.1}") };
             painter.text(pos2(x, bar.bottom() + 2.0), Align2::CENTER_TOP, text, FontId::proportional(10.0), p.weak);
         }
-        let response = response.on_hover_text(format!(
-            "{info}. Drag the left or right half to move that end; double-click resets to {:.2} to {:.2} mm",
-            self.default.lo, self.default.hi
-        ));
-        if response.double_clicked() {
-            return Some(self.default);
-        }
-        let moved = response.drag_delta().x;
-        if response.dragged_by(PointerButton::Primary) && moved != 0.0 {
-            let per_point = (range.hi - range.lo) / bar.width().max(1.0);
-            let origin = ui.input(|i| i.pointer.press_origin()).map_or(0.0, |o| o.x);
-            let mut new = range;
-            if origin < bar.center().x {
-                new.lo += moved * per_point
-            } else {
-                new.hi += moved * per_point
-            }
-            if self.symmetric {
-                new = Range::symmetric(if origin < bar.center().x { new.lo } else { new.hi });
-            }
-            return (new.hi - new.lo >= 0.01).then_some(new);
-        }
-        None
+        let tip = format!("{info}; double-click resets to {:.2} to {:.2} mm", self.default.lo, self.default.hi);
+        response.on_hover_text(tip).double_clicked().then_some(self.default)
     }
 }
 

@@ -14,14 +14,13 @@ pub(crate) const IMAGE: &[(&str, &str)] = &[
 ];
 
 /// Controls of the comparison of any two imprints.
-pub(crate) const VERSUS: &[(&str, &str)] = &[
+pub(crate) const COMPARE: &[(&str, &str)] = &[
     ("Click on A or B", "choose what to compare"),
     ("[[swap_compared]]", "swap A and B"),
-    ("[[compare_mode]]", "side by side, wipe, difference, 3D"),
+    ("[[compare_mode]]", "side by side, difference"),
     ("Hold F", "show B instead of A"),
-    ("Drag the line", "wipe"),
     ("Hover", "both values and their difference, in the status bar"),
-    ("Wheel, drag, double-click", "zoom, move, fit; in 3D zoom, orbit, fit"),
+    ("Wheel, drag, double-click", "zoom, move, fit"),
 ];
 
 /// Mouse controls of an image that can be painted on.
@@ -42,21 +41,20 @@ pub(crate) const SCENE: &[(&str, &str)] = &[
     ("Double-click", "center the point; beside all points, or [[fit]]: fit"),
     ("[[camera_left]], [[camera_right]], [[camera_front]], [[camera_top]]", "from left, right, front, top"),
     ("Hover", "cross-hair in the images"),
-    ("Click a point", "read it, or measure with [[measure_distance]] (mm) and [[measure_angle]] (angle)"),
+    ("Click a point", "read it"),
     ("[[pose_tool]]", "pose tool: keys or handles; [[accept]] accepts, [[cancel_jobs]] reverts"),
     ("[[distances]], [[next_layer]]", "distance to the CAD in mm; other colorings"),
     ("[[window_only]], [[parallel]]", "GelSlim window only, parallel projection"),
-    ("Click on the colored dots", "legend: show or hide, color, size, opacity"),
+    ("Click on the colored dots", "legend: show or hide"),
 ];
 
-/// Controls of the time machine.
+/// Controls of the steps of a registration.
 pub(crate) const STEPS: &[(&str, &str)] = &[
-    ("Drag in the curves", "scrub"),
+    ("Drag in the curves", "go through the steps"),
     ("Click on a curve", "show that start and step"),
     ("[[step_back]] and [[step_forward]]", "previous and next step"),
     ("[[first_step]] and [[last_step]]", "first and last step"),
     ("[[play_steps]]", "play or pause, also over a 3D view"),
-    ("[[pin_step]]", "keep the step to compare others with it"),
 ];
 
 /// The list of `controls`, with their keys.

@@ -15,10 +15,6 @@ pub enum Icon {
     Distance,
     /// Layers on each other.
     Layers,
-    /// A ruler.
-    Ruler,
-    /// Two legs and an arc.
-    Angle,
     /// Arrows to four sides: what is held is moved.
     Hand,
     /// A brush.
@@ -68,14 +64,6 @@ impl Icon {
                 vec![[1.0, 7.2], [7.0, 10.2], [13.0, 7.2]],
                 vec![[1.0, 9.9], [7.0, 12.9], [13.0, 9.9]],
             ],
-            Self::Ruler => vec![
-                vec![[1.0, 9.0], [9.0, 1.0], [13.0, 5.0], [5.0, 13.0], [1.0, 9.0]],
-                vec![[3.5, 6.5], [5.2, 8.2]],
-                vec![[5.8, 4.2], [7.5, 5.9]],
-            ],
-            Self::Angle => {
-                vec![vec![[12.0, 2.0], [1.5, 11.5], [13.0, 11.5]], circle(1.5, 11.5, 6.5, -0.12, 0.0)]
-            }
             Self::Hand => vec![
                 vec![[7.0, 1.0], [7.0, 13.0]],
                 vec![[1.0, 7.0], [13.0, 7.0]],

@@ -21,7 +21,8 @@ pub(crate) fn form(cx: &mut Cx<'_>, ctx: &egui::Context) {
     let mut open = true;
     let mut choice = cx.state.export.masks;
     let window = egui::Window::new("Export masks").id(egui::Id::unique("mask export form")).open(&mut open);
-    let window = window.collapsible(false).resizable(false).default_pos([320.0, 90.0]);
+    let middle = ctx.content_rect().center();
+    let window = window.collapsible(false).resizable(false).pivot(egui::Align2::CENTER_CENTER).default_pos(middle);
     window.show(ctx, |ui| {
         ui.set_width(400.0);
         ui.spacing_mut().item_spacing = vec2(8.0, 6.0);

@@ -27,7 +27,7 @@ pub(super) const IGNORE_PNG: &str = ".ignore.png";
     Deserialize,
     EnumIter,
     EnumString,
-    IntoStaticStr,
+    IntoStaticStr
 )]
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]

@@ -1,4 +1,4 @@
-//! The sheet of all actions and their keys: what works here first, then the rest by group.
+//! The list of all actions and their keys: what works here first, then the rest by group.
 
 use eframe::egui::{self, Layout, RichText, Ui, vec2};
 use strum::IntoEnumIterator as _;
@@ -14,12 +14,12 @@ const COLUMN: f32 = 370.0;
 /// Height of a row, points.
 const ROW: f32 = 18.0;
 
-/// State of the sheet.
+/// State of the list.
 #[derive(Debug, Default)]
 pub(crate) struct Memory {
     open: bool,
     filter: String,
-    /// The pane that the pointer was over last, before the sheet covered it.
+    /// The pane that the pointer was over last, before the list covered it.
     over: Option<Pane>,
 }
 
@@ -32,8 +32,8 @@ impl Memory {
     }
 }
 
-/// The sheet, if it is open.
-pub(crate) fn sheet(cx: &mut Cx<'_>, ctx: &egui::Context, memory: &mut Memory) {
+/// The list, if it is open.
+pub(crate) fn list(cx: &mut Cx<'_>, ctx: &egui::Context, memory: &mut Memory) {
     if !cx.state.selection.shortcut_sheet {
         *memory = Memory { over: memory.over, ..Memory::default() };
         return;
@@ -60,7 +60,7 @@ pub(crate) fn sheet(cx: &mut Cx<'_>, ctx: &egui::Context, memory: &mut Memory) {
         ui.add_space(4.0);
         let height = (size.y - 180.0).max(120.0);
         let scroll = egui::ScrollArea::vertical().max_height(height).min_scrolled_height(height);
-        // The sheet stays as large as it is when a filter leaves little of it.
+        // The list stays as large as it is when a filter leaves little of it.
         scroll.auto_shrink(false).show(ui, |ui| body(cx, ui, memory));
     });
     if modal.should_close() {
@@ -81,14 +81,14 @@ fn body(cx: &Cx<'_>, ui: &mut Ui, memory: &Memory) {
     };
     let workspace = cx.state.settings.workspace;
     let over = memory.over.filter(|pane| cx.state.selection.panes.contains(pane));
-    let here = |action: Action| action.is_of(workspace, over) && action.command(cx.state).is_some();
+    let fits_place = |action: Action| action.is_of(workspace, over) && action.command(cx.state).is_some();
     let place = over.map_or(String::new(), |pane| format!(", {}", pane.title()));
     let mut parts = vec![(
         format!("Here: {}{place}", workspace.name()),
-        Action::iter().filter(|action| here(*action) && fits(*action)).collect::<Vec<_>>(),
+        Action::iter().filter(|action| fits_place(*action) && fits(*action)).collect::<Vec<_>>(),
     )];
     for group in Group::iter() {
-        let rest = group.actions().filter(|action| !here(*action) && fits(*action)).collect();
+        let rest = group.actions().filter(|action| !fits_place(*action) && fits(*action)).collect();
         parts.push((group.name().to_owned(), rest));
     }
     parts.retain(|(_, actions)| !actions.is_empty());

@@ -1,7 +1,6 @@
 //! Flat triangles into a picture that stays: what the window's toolkit draws, at what a software renderer can do fast.
 //!
-//! The cost is that of the fragments: one color without a texture costs a fraction of a sampled one, and what is opaque
-//! need not be blended with what it hides.
+//! The cost is that of the fragments: one color without a texture costs a fraction of a sampled one.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -27,17 +26,9 @@ pub struct Corner {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fill {
     /// By the colors of their corners.
-    Flat {
-        /// True where nothing below shows through.
-        opaque: bool,
-    },
-    /// By a texture times the colors of their corners.
-    Textured {
-        /// Key of the texture.
-        key: u64,
-        /// True where nothing below shows through.
-        opaque: bool,
-    },
+    Flat,
+    /// By the texture of this key times the colors of their corners.
+    Textured(u64),
 }
 
 /// Triangles in a row that are filled alike.
@@ -53,10 +44,10 @@ pub struct Run {
 
 /// Pipelines and textures.
 #[derive(Debug)]
-pub struct TriangleSheet {
+pub struct Raster {
     layout: wgpu::BindGroupLayout,
-    flat: [wgpu::RenderPipeline; 2],
-    textured: [wgpu::RenderPipeline; 2],
+    flat: wgpu::RenderPipeline,
+    textured: wgpu::RenderPipeline,
     whole: wgpu::RenderPipeline,
     samplers: [wgpu::Sampler; 2],
     textures: BTreeMap<u64, Texture>,
@@ -69,7 +60,6 @@ struct Texture {
     /// `None` for what somebody else draws.
     own: Option<wgpu::Texture>,
     bindings: wgpu::BindGroup,
-    opaque: bool,
 }
 
 /// A picture of the window's size, and how it is put on the window.
@@ -98,17 +88,17 @@ impl FramePicture {
 /// Premultiplied colors over what is there.
 const OVER: wgpu::BlendState = wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING;
 
-impl TriangleSheet {
+impl Raster {
     /// For pictures and a window of `format`.
     ///
     /// # Errors
     /// [`GpuError::Shader`] and [`GpuError::Device`].
     pub fn new(gpu: &Gpu, format: wgpu::TextureFormat) -> Result<Self, GpuError> {
-        let module = shaders::compile(gpu, "sheet.wgsl")?;
+        let module = shaders::compile(gpu, "raster.wgsl")?;
         gpu.guarded("building the pipelines of the window", || {
             let device = &gpu.device;
             let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-                label: Some("TriangleSheet::layout"),
+                label: Some("Raster::layout"),
                 entries: &[
                     wgpu::BindGroupLayoutEntry {
                         binding: 0,
@@ -164,19 +154,16 @@ impl TriangleSheet {
             };
             let sampler = |filter| {
                 device.create_sampler(&wgpu::SamplerDescriptor {
-                    label: Some("TriangleSheet::sampler"),
+                    label: Some("Raster::sampler"),
                     mag_filter: filter,
                     min_filter: filter,
                     ..Default::default()
                 })
             };
-            let two = |label, fragment: &str, bound| {
-                [Some(OVER), None].map(|blend| build(label, ["vs_main", fragment], bound, blend))
-            };
             Ok(Self {
-                flat: two("TriangleSheet::flat", "fs_flat", false),
-                textured: two("TriangleSheet::textured", "fs_tinted", true),
-                whole: build("TriangleSheet::whole", ["vs_whole", "fs_copied"], true, None),
+                flat: build("Raster::flat", ["vs_main", "fs_flat"], false, Some(OVER)),
+                textured: build("Raster::textured", ["vs_main", "fs_tinted"], true, Some(OVER)),
+                whole: build("Raster::whole", ["vs_whole", "fs_copied"], true, None),
                 samplers: [wgpu::FilterMode::Linear, wgpu::FilterMode::Nearest].map(sampler),
                 layout,
                 textures: BTreeMap::new(),
@@ -186,21 +173,21 @@ impl TriangleSheet {
         })
     }
 
-    /// Paints one pixel, so that a device which cannot is known before anything is left to this sheet.
+    /// Paints one pixel, so that a device which cannot is known before anything is left to it.
     ///
     /// # Errors
     /// As [`Self::paint`].
     pub fn prove(&mut self, gpu: &Gpu, format: wgpu::TextureFormat) -> Result<(), GpuError> {
         let corner = |at| Corner { at, uv: [0.0; 2], color: [0, 0, 0, 255] };
         let corners = [[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0]].map(corner);
-        let run = Run { scissor: [0, 0, 1, 1], indices: 0..3, fill: Fill::Flat { opaque: true } };
+        let run = Run { scissor: [0, 0, 1, 1], indices: 0..3, fill: Fill::Flat };
         let picture = self.picture(gpu, [1, 1], format);
         self.paint(gpu, &picture, &corners, &[0, 1, 2], &[run])
     }
 
     fn bind(&self, gpu: &Gpu, view: &wgpu::TextureView, nearest: bool) -> wgpu::BindGroup {
         gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("TriangleSheet::texture"),
+            label: Some("Raster::texture"),
             layout: &self.layout,
             entries: &[
                 wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(view) },
@@ -212,11 +199,11 @@ impl TriangleSheet {
         })
     }
 
-    /// An empty picture of `size` pixels and `format`, which must be that of the sheet.
+    /// An empty picture of `size` pixels and `format`, which must be that of the raster.
     pub fn picture(&self, gpu: &Gpu, size: [u32; 2], format: wgpu::TextureFormat) -> FramePicture {
         let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING;
-        let view = texture(gpu, "TriangleSheet::picture", size, format, usage)
-            .create_view(&wgpu::TextureViewDescriptor::default());
+        let view =
+            texture(gpu, "Raster::picture", size, format, usage).create_view(&wgpu::TextureViewDescriptor::default());
         let bindings = self.bind(gpu, &view, true);
         FramePicture { size, view, bindings, pipeline: self.whole.clone() }
     }
@@ -224,36 +211,29 @@ impl TriangleSheet {
     /// Makes or replaces a texture of `size` pixels, row by row; `rgba` premultiplied.
     pub fn set(&mut self, gpu: &Gpu, key: u64, size: [u32; 2], rgba: &[u8], nearest: bool) {
         let usage = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST;
-        let own = texture(gpu, "TriangleSheet::texture", size, wgpu::TextureFormat::Rgba8Unorm, usage);
+        let own = texture(gpu, "Raster::texture", size, wgpu::TextureFormat::Rgba8Unorm, usage);
         write(gpu, &own, [0; 2], size, rgba);
         let bindings = self.bind(gpu, &own.create_view(&wgpu::TextureViewDescriptor::default()), nearest);
-        let opaque = rgba.chunks_exact(4).all(|p| p[3] == 255);
-        self.textures.insert(key, Texture { own: Some(own), bindings, opaque });
+        self.textures.insert(key, Texture { own: Some(own), bindings });
     }
 
     /// Writes a part of a texture at `place`; returns whether there is such a texture.
-    pub(crate) fn set_part(&mut self, gpu: &Gpu, key: u64, place: [u32; 2], size: [u32; 2], rgba: &[u8]) -> bool {
-        let Some(texture) = self.textures.get_mut(&key) else { return false };
+    pub(crate) fn set_part(&self, gpu: &Gpu, key: u64, place: [u32; 2], size: [u32; 2], rgba: &[u8]) -> bool {
+        let Some(texture) = self.textures.get(&key) else { return false };
         let Some(own) = &texture.own else { return false };
-        texture.opaque = false;
         write(gpu, own, place, size, rgba);
         true
     }
 
-    /// A texture that somebody else draws, opaque.
+    /// A texture that somebody else draws.
     pub fn show(&mut self, gpu: &Gpu, key: u64, view: &wgpu::TextureView) {
         let bindings = self.bind(gpu, view, false);
-        self.textures.insert(key, Texture { own: None, bindings, opaque: true });
+        self.textures.insert(key, Texture { own: None, bindings });
     }
 
     /// Frees a texture.
     pub fn free(&mut self, key: u64) {
         self.textures.remove(&key);
-    }
-
-    /// True where nothing shows through a texture.
-    pub(crate) fn is_opaque(&self, key: u64) -> bool {
-        self.textures.get(&key).is_some_and(|t| t.opaque)
     }
 
     /// Paints into a picture, over what is there.
@@ -270,14 +250,14 @@ impl TriangleSheet {
     ) -> Result<(), GpuError> {
         gpu.guarded("painting the window", || {
             let usage = wgpu::BufferUsages::VERTEX;
-            let corners = Elements::upload(gpu, "TriangleSheet::corners", corners, usage, self.corners.take())?;
+            let corners = Elements::upload(gpu, "Raster::corners", corners, usage, self.corners.take())?;
             let usage = wgpu::BufferUsages::INDEX;
-            let indices = Elements::upload(gpu, "TriangleSheet::indices", indices, usage, self.indices.take())?;
-            let label = Some("TriangleSheet::encoder");
+            let indices = Elements::upload(gpu, "Raster::indices", indices, usage, self.indices.take())?;
+            let label = Some("Raster::encoder");
             let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label });
             {
                 let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                    label: Some("TriangleSheet::pass"),
+                    label: Some("Raster::pass"),
                     color_attachments: &[Some(wgpu::RenderPassColorAttachment {
                         view: &picture.view,
                         depth_slice: None,
@@ -290,10 +270,10 @@ impl TriangleSheet {
                 pass.set_index_buffer(indices.buffer.slice(..), wgpu::IndexFormat::Uint32);
                 for run in runs {
                     match run.fill {
-                        Fill::Flat { opaque } => pass.set_pipeline(&self.flat[usize::from(opaque)]),
-                        Fill::Textured { key, opaque } => {
+                        Fill::Flat => pass.set_pipeline(&self.flat),
+                        Fill::Textured(key) => {
                             let Some(texture) = self.textures.get(&key) else { continue };
-                            pass.set_pipeline(&self.textured[usize::from(opaque)]);
+                            pass.set_pipeline(&self.textured);
                             pass.set_bind_group(0, &texture.bindings, &[]);
                         }
                     }

@@ -8,29 +8,20 @@ use touch2touch_pipeline::compare::subject::Subject;
 /// The way in which two imprints are held against each other.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, EnumIter)]
 #[serde(rename_all = "snake_case")]
-pub enum VersusMode {
+pub enum CompareMode {
     /// A at the left, B at the right.
     Side,
-    /// A at the left of a line that is dragged, B at the right of it.
-    Wipe,
     /// A minus B.
     #[default]
     Difference,
-    /// Both clouds in 3D.
-    Clouds,
-    /// The cloud of A in 3D, colored by how far it lies from that of B.
-    Apart,
 }
 
-impl VersusMode {
+impl CompareMode {
     /// The name on screen.
     pub fn name(self) -> &'static str {
         match self {
             Self::Side => "Side",
-            Self::Wipe => "Wipe",
             Self::Difference => "Difference",
-            Self::Clouds => "3D",
-            Self::Apart => "3D difference",
         }
     }
 
@@ -38,38 +29,30 @@ impl VersusMode {
     pub fn tooltip(self) -> &'static str {
         match self {
             Self::Side => "A on the left, B on the right",
-            Self::Wipe => "A left, B right of a line that you drag",
             Self::Difference => "A minus B in millimeters: blue where A is shallower, red where it is deeper",
-            Self::Clouds => "Contact points of both in 3D, with the CAD model at both poses",
-            Self::Apart => "Points of A in 3D, colored by their distance to the surface of B, in mm",
         }
-    }
-
-    /// True where it is a 3D view.
-    pub fn is_3d(self) -> bool {
-        matches!(self, Self::Clouds | Self::Apart)
     }
 }
 
 /// Two imprints that are compared, and how.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct Versus {
+pub struct CompareChoice {
     /// One.
     pub a: Subject,
     /// The other.
     pub b: Subject,
     /// The way.
-    pub mode: VersusMode,
+    pub mode: CompareMode,
 }
 
-impl Default for Versus {
+impl Default for CompareChoice {
     fn default() -> Self {
-        Self { a: Subject::shown(), b: Subject::Measured, mode: VersusMode::default() }
+        Self { a: Subject::shown(), b: Subject::Measured, mode: CompareMode::default() }
     }
 }
 
-impl Versus {
+impl CompareChoice {
     /// True where it is the error: what is predicted minus what was measured, as at first.
     pub fn is_error(&self) -> bool {
         *self == Self::default()

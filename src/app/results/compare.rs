@@ -1,119 +1,71 @@
-//! Any two imprints of a touch against each other: what each side is, their figures, clouds and poses.
+//! Any two imprints of a touch against each other: what each side is, their figures and poses.
 
-use std::borrow::Cow;
 use std::sync::Arc;
 
-use super::super::jobs::{Job, Lane};
+use super::super::jobs::{Job, Worker};
 use super::super::keys::{
-    CloudDifferenceKey, CloudKey, ComparedKey, ImprintKey, ImprintSource, MaskKey, MeanKey, MetersKey, PictureKey,
-    PoseKey, PredictionKey, ShiftMode, TouchKey, VersusKey,
+    ComparisonKey, EstimateKey, ImprintKey, ImprintSource, MeanKey, PictureKey, PredictionKey, ShiftMode, TouchKey,
 };
 use super::super::pane::Demand;
-use super::super::results::{Computes, Demands};
-use super::super::services::SharedServices;
-use super::super::state::settings::versus::{Versus, VersusMode};
+use super::super::results::{Computes, Demands, gone};
+use super::super::services::Services;
+use super::super::state::settings::compare::{CompareChoice, CompareMode};
 use super::super::state::{Absent, Lookup, State};
 use super::super::{recipe, results};
 use touch2touch_core::grid::DepthMap;
-use touch2touch_core::rig::PadId;
-use touch2touch_core::sample::Sample;
-use touch2touch_pipeline::compare::depict::mean;
-use touch2touch_pipeline::compare::deviation::{CloudDifference, cloud_difference};
+use touch2touch_core::rig::{PadId, PerPad};
+use touch2touch_pipeline::compare::depict::{SubjectImprints, mean};
 use touch2touch_pipeline::compare::subject::{MadeFrom, RecipeChange, Subject};
-use touch2touch_pipeline::compare::{Beside, Comparison, Depicted, between, tile_of};
-use touch2touch_pipeline::error::TaskError;
-use touch2touch_pipeline::steps::cloud::Clouds;
+use touch2touch_pipeline::compare::{Comparison, between, tile_of};
+use touch2touch_pipeline::steps::estimate::Estimate;
 use touch2touch_pipeline::steps::pose::PoseResult;
-use touch2touch_pipeline::steps::prediction::Prediction;
+use touch2touch_pipeline::steps::recipe::Recipe;
 
 impl Computes for MeanKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<DepthMap>> {
-        let meters =
-            |recipe: &PredictionKey| state.results.imprints.get(&MetersKey(recipe.clone(), self.shift)).cloned();
-        let imprints: Vec<Arc<DepthMap>> = self.recipes.iter().map(meters).collect::<Option<_>>()?;
-        Some(Job::new(Lane::Compute, "Mean of the seeds", move |_| {
-            mean(&imprints.iter().map(|i| &**i).collect::<Vec<_>>())
-        }))
-    }
-}
-
-impl Computes for ComparedKey {
-    fn job(&self, state: &State, services: &SharedServices) -> Option<Job<Prediction>> {
-        self.0.job(state, services)
-    }
-
-    /// It does not push away what is looked at.
-    fn arrived(&self, state: &mut State, made: &Arc<Prediction>) {
-        results::keep_prediction(state, self.0.clone(), made.clone(), false);
-    }
-}
-
-/// An imprint with what is known of its picture, as an input of a job.
-struct Part {
-    of: ImprintKey,
-    imprint: DepthMap,
-    drawn: Option<(Arc<Prediction>, ShiftMode)>,
-    beside: Option<Arc<Beside>>,
-}
-
-impl Part {
-    fn of(of: &ImprintKey, state: &State) -> Option<Self> {
-        let (mut drawn, mut beside) = (None, None);
-        match of {
-            ImprintKey::Predicted(recipe, shift) => {
-                drawn = Some((state.results.predictions.get(recipe)?.clone(), *shift));
-            }
-            ImprintKey::Picture(touch) => beside = Some(state.results.pictures.get(&PictureKey(*touch))?.clone()),
-            ImprintKey::Measured(_) | ImprintKey::Mean(_) => {}
-        }
-        let imprint = results::imprint_of(state, of).ready()?.clone();
-        Some(Self { of: of.clone(), imprint, drawn, beside })
-    }
-
-    fn depicted<'a>(
-        &'a self,
-        sample: &Sample,
-        pad: PadId,
-        tile: Option<&'a DepthMap>,
-    ) -> Result<Depicted<'a>, TaskError> {
-        let own = match (&self.of, &self.beside) {
-            (ImprintKey::Measured(_), _) => tile,
-            (_, Some(found)) => Some(&found.tile),
-            _ => {
-                let drawn = self.drawn.as_ref().map(|(prediction, shift)| (&**prediction, *shift));
-                return Depicted::predicted(&self.imprint, drawn, sample, pad, tile);
-            }
+    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<DepthMap>> {
+        let meters = |made: &PredictionKey| {
+            results::imprint_of(state, &ImprintKey::Predicted(made.clone(), self.shift)).ready().cloned()
         };
-        Ok(Depicted { imprint: &self.imprint, tile: own.map(Cow::Borrowed) })
+        let imprints: Vec<DepthMap> = self.recipes.iter().map(meters).collect::<Option<_>>()?;
+        Some(Job::new(Worker::Compute, "Mean of the seeds", move |_| mean(&imprints.iter().collect::<Vec<_>>())))
     }
 }
 
-impl Computes for VersusKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Comparison>> {
-        let touch = self.a.touch();
-        let parts = [Part::of(&self.a, state)?, Part::of(&self.b, state)?];
+/// One side of a comparison, as the verb has it; `None` if something of it is not there.
+fn imprints(state: &State, of: &ImprintKey) -> Option<SubjectImprints> {
+    let estimate = match state.results.estimates.get(&EstimateKey::imprint(of)) {
+        Some(known) => (**known).clone(),
+        None => {
+            let mut imprints = PerPad::default();
+            imprints[of.touch().finger] = Some(results::imprint_of(state, of).ready()?.clone());
+            Estimate::with_imprints(&Recipe::default(), imprints)
+        }
+    };
+    let tile = match of {
+        ImprintKey::Picture(touch) => Some(state.results.pictures.get(&PictureKey(*touch))?.tile.clone()),
+        _ => None,
+    };
+    Some(SubjectImprints { estimate, tile })
+}
+
+impl Computes for ComparisonKey {
+    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Comparison>> {
+        let (touch, key) = (self.a.touch(), self.clone());
+        let (mut a, mut b) = (imprints(state, &self.a)?, imprints(state, &self.b)?);
         let sample = state.results.samples.get(&touch.pair)?.clone();
         let source = state.library.open.as_ref()?.source.clone();
-        let what = match self.b {
-            ImprintKey::Measured(_) => "Compare prediction and measurement",
-            _ => "Compare A and B",
-        };
-        Some(Job::new(Lane::Compute, what, move |_| {
-            let tile = match source.as_dataset() {
-                Some(dataset) => tile_of(dataset, touch.pair.pair, &sample)?,
-                None => None,
-            };
-            let [a, b] = parts.each_ref().map(|part| part.depicted(&sample, touch.finger, tile.as_ref()));
-            between(&a?, &b?, sample.scale)
+        Some(Job::new(Worker::Compute, "Compare A and B", move |_| {
+            let tile = tile_of(&source.dataset, touch.pair.pair, &sample)?;
+            for (side, of) in [(&mut a, &key.a), (&mut b, &key.b)] {
+                if matches!(of, ImprintKey::Measured(_)) {
+                    side.tile.clone_from(&tile);
+                }
+            }
+            let finger = touch.finger;
+            let a = a.of_pad(&sample, finger, tile.as_ref())?.ok_or_else(gone)?;
+            let b = b.of_pad(&sample, finger, tile.as_ref())?.ok_or_else(gone)?;
+            between(&a, &b, sample.scale)
         }))
-    }
-}
-
-impl Computes for CloudDifferenceKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<CloudDifference>> {
-        let cloud = |key: &CloudKey| state.results.clouds.get(key).cloned();
-        let (a, b) = (cloud(&self.a)?, cloud(&self.b)?);
-        Some(Job::new(Lane::Compute, "Distances between clouds", move |_| Ok(cloud_difference(&a, &b))))
     }
 }
 
@@ -186,7 +138,7 @@ pub fn subject<'a>(state: &'a State, subject: &Subject, finger: PadId) -> Lookup
                 return Lookup::Absent(Absent::NoInput);
             }
             let made = made_for(state, subject, touch).map(|(recipes, _)| recipes).unwrap_or_default();
-            made.into_iter().find_map(|recipe| state.failure(ComparedKey(recipe)))
+            made.into_iter().find_map(|recipe| state.failure(recipe))
         }
         _ => None,
     };
@@ -196,37 +148,33 @@ pub fn subject<'a>(state: &'a State, subject: &Subject, finger: PadId) -> Lookup
 /// One subject against another of a finger.
 pub fn subjects_compared<'a>(state: &'a State, a: &Subject, b: &Subject, finger: PadId) -> Lookup<'a, Comparison> {
     match (subject_key(state, a, finger), subject_key(state, b, finger)) {
-        (Ok(a), Ok(b)) => state.look(VersusKey { a, b }).value(),
+        (Ok(a), Ok(b)) => state.look(ComparisonKey { a, b }).value(),
         (Err(absent), _) | (_, Err(absent)) => Lookup::Absent(absent),
     }
 }
 
-/// The cloud of a subject, the contact by the masks in force on the two sides that are always shown, else by
-/// automatic ones; `Err` holds the masks that are missing for it.
-fn subject_cloud(state: &State, subject: &Subject) -> Result<CloudKey, Vec<MaskKey>> {
-    match side_of(subject) {
-        Some(side) => results::cloud_key(state, side).ok().flatten().ok_or_else(Vec::new),
-        None => {
-            let fingers =
-                state.rig().pads().filter_map(|finger| Some((finger, subject_key(state, subject, finger).ok()?)));
-            results::automatic_cloud(state, fingers)
+/// The cloud of a subject; `None` while an imprint of it is not there.
+fn subject_cloud(state: &State, subject: &Subject) -> Option<EstimateKey> {
+    if let Some(side) = side_of(subject) {
+        return results::cloud_key(state, side).ok()?;
+    }
+    let mut parts = PerPad::default();
+    for finger in state.rig().pads() {
+        let camera = results::touch(state, finger).ready().is_some_and(|t| t.camera().is_some());
+        let Some(imprint) = subject_key(state, subject, finger).ok().filter(|_| camera) else { continue };
+        results::imprint_of(state, &imprint).ready()?;
+        if let Some(mask) = results::mask_version(state, &imprint, finger) {
+            parts[finger] = Some((imprint, Some(mask)));
         }
     }
+    (!parts.is_empty()).then(|| EstimateKey::cloud(parts))
 }
 
-/// The surface points of a subject, where they are there, with their recipe.
-pub(crate) fn subject_points<'a>(state: &'a State, subject: &Subject) -> Option<(CloudKey, &'a Clouds)> {
-    let key = subject_cloud(state, subject).ok()?;
-    let found = state.results.clouds.get(&key)?.surface();
-    Some((key, found))
-}
-
-fn subject_pose_key(state: &State, subject: &Subject) -> Option<PoseKey> {
+fn subject_pose_key(state: &State, subject: &Subject) -> Option<EstimateKey> {
     if let Some(side) = side_of(subject) {
         return results::pose_key(state, side).ok()?;
     }
-    let cloud = subject_cloud(state, subject).ok()?;
-    Some(PoseKey::of(cloud, results::tool_name(state).ok()?.into(), &recipe::in_force(state, ImprintSource::Predicted)))
+    Some(subject_cloud(state, subject)?.posed(results::tool_name(state).ok()?, state.settings.registration))
 }
 
 /// Why the subjects have no poses, if they cannot have any.
@@ -241,27 +189,16 @@ pub(crate) fn pose_absent(state: &State) -> Option<Absent> {
 
 /// The pose of a subject, where it is there.
 pub fn subject_pose<'a>(state: &'a State, subject: &Subject) -> Option<&'a PoseResult> {
-    state.results.poses.get(&subject_pose_key(state, subject)?).map(|pose| &**pose)
-}
-
-/// The distances of the points of one subject from those of another, where they are there, with their key.
-pub fn subjects_apart<'a>(
-    state: &'a State,
-    a: &Subject,
-    b: &Subject,
-) -> Option<(CloudDifferenceKey, &'a CloudDifference)> {
-    let key = CloudDifferenceKey { a: subject_cloud(state, a).ok()?, b: subject_cloud(state, b).ok()? };
-    let found = state.results.apart.get(&key)?;
-    Some((key, found))
+    results::pose_of(state, &subject_pose_key(state, subject)?)
 }
 
 /// Asks for what the pane of the comparison shows and is not there.
-pub(crate) fn want_versus(wants: &mut Demands<'_>) {
+pub(crate) fn want_compared(wants: &mut Demands<'_>) {
     let state = wants.state;
-    if !state.needs(Demand::Versus) || results::sample(state).ready().is_none() {
+    if !state.needs(Demand::Compare) || results::sample(state).ready().is_none() {
         return;
     }
-    let Versus { a, b, mode } = state.settings.compared();
+    let CompareChoice { a, b, mode } = state.settings.compared();
     let both = [a, b];
     let posed = pose_absent(state).is_none();
     let shown = state.fingers();
@@ -277,9 +214,9 @@ pub(crate) fn want_versus(wants: &mut Demands<'_>) {
         let measured = with(&Subject::Measured);
         for (a, b) in [(&a, &b), (&a, &measured), (&b, &measured)] {
             if let (Some(a), Some(b)) = (a, b)
-                && (a != b || mode == VersusMode::Difference)
+                && (a != b || mode == CompareMode::Difference)
             {
-                wants.ask(VersusKey { a: a.clone(), b: b.clone() });
+                wants.ask(ComparisonKey { a: a.clone(), b: b.clone() });
             }
         }
     }
@@ -289,14 +226,6 @@ pub(crate) fn want_versus(wants: &mut Demands<'_>) {
     }
     for subject in &both {
         want_subject_place(wants, subject);
-    }
-    let clouds = both.each_ref().map(|subject| subject_cloud(state, subject).ok());
-    if let [Some(a), Some(b)] = clouds
-        && mode == VersusMode::Apart
-        && state.results.clouds.contains(&a)
-        && state.results.clouds.contains(&b)
-    {
-        wants.ask(CloudDifferenceKey { a, b });
     }
 }
 
@@ -321,12 +250,12 @@ pub(crate) fn want_subject(wants: &mut Demands<'_>, subject: &Subject, finger: P
             let mut whole = true;
             for recipe in recipes {
                 if state.results.predictions.contains(&recipe) {
-                    let meters = MetersKey(recipe, shift);
-                    whole &= state.results.imprints.contains(&meters);
+                    let meters = EstimateKey::imprint(&ImprintKey::Predicted(recipe, shift));
+                    whole &= state.results.estimates.contains(&meters);
                     wants.ask(meters);
                 } else {
                     whole = false;
-                    wants.ask_unless(state.tasks.generating(&recipe).is_some(), ComparedKey(recipe));
+                    wants.ask_unless(state.tasks.generating(&recipe).is_some(), recipe);
                 }
             }
             if let ImprintKey::Mean(key) = key
@@ -339,26 +268,17 @@ pub(crate) fn want_subject(wants: &mut Demands<'_>, subject: &Subject, finger: P
     }
 }
 
-/// Masks, cloud and pose of a subject.
+/// Cloud and pose of a subject.
 pub(crate) fn want_subject_place(wants: &mut Demands<'_>, subject: &Subject) {
     let state = wants.state;
     if let Some(side) = side_of(subject) {
-        for finger in state.rig().pads() {
-            results::want_mask(wants, side, finger);
-        }
-        if results::want_cloud(wants, side) {
-            results::want_pose(wants, side);
-        }
-        return;
+        return results::want_side(wants, side, [true, true], |_| true);
     }
     results::want_tool(wants);
-    match subject_cloud(state, subject) {
-        Err(missing) => missing.into_iter().for_each(|mask| wants.ask(mask)),
-        Ok(cloud) if !state.results.clouds.contains(&cloud) => wants.ask(cloud),
-        Ok(_) if results::tool(state).ready().is_some() => {
-            subject_pose_key(state, subject).into_iter().for_each(|pose| wants.ask(pose));
-        }
-        Ok(_) => {}
+    if !results::awaits_tool(state) {
+        let tool = results::tool(state).ready().is_some();
+        let key = if tool { subject_pose_key(state, subject) } else { subject_cloud(state, subject) };
+        key.into_iter().for_each(|key| wants.ask(key));
     }
 }
 
@@ -373,7 +293,7 @@ pub fn comparison(state: &State, finger: PadId) -> Lookup<'_, Comparison> {
     if results::bubble(state, finger).ready().is_none() {
         return results::bubble(state, finger).without();
     }
-    state.look(VersusKey::measured(recipe.clone(), state.settings.shift)).value()
+    state.look(ComparisonKey::measured(recipe.clone(), state.settings.shift)).value()
 }
 
 pub(crate) fn want_comparison(wants: &mut Demands<'_>, finger: PadId, touch: TouchKey) {
@@ -381,6 +301,6 @@ pub(crate) fn want_comparison(wants: &mut Demands<'_>, finger: PadId, touch: Tou
     let Some(recipe) = results::shown(state, touch) else { return };
     let there = |source| results::imprint(state, source, finger).ready().is_some();
     if there(ImprintSource::Measured) && there(ImprintSource::Predicted) {
-        wants.ask(VersusKey::measured(recipe.clone(), state.settings.shift));
+        wants.ask(ComparisonKey::measured(recipe.clone(), state.settings.shift));
     }
 }

@@ -8,7 +8,7 @@ use std::thread::JoinHandle;
 use strum::IntoEnumIterator as _;
 
 use super::super::answers::Answer;
-use super::super::jobs::{self, Body, Lane};
+use super::super::jobs::{self, Body, Worker};
 use super::super::keys::DatasetSeq;
 use super::super::state::results::{Computed, Request};
 use super::{JobId, Wake, lock};
@@ -60,49 +60,49 @@ impl Queue {
     }
 }
 
-struct LaneState {
+struct WorkerState {
     queue: Mutex<Queue>,
     filled: Condvar,
 }
 
-pub(super) struct Lanes {
-    lanes: Vec<Arc<LaneState>>,
-    threads: Vec<(Lane, JoinHandle<()>)>,
+pub(super) struct Workers {
+    workers: Vec<Arc<WorkerState>>,
+    threads: Vec<(Worker, JoinHandle<()>)>,
     sender: Sender<Event>,
     /// The demands that the queues were last filled from.
     demanded: Vec<Request>,
     threaded: bool,
 }
 
-/// Threads of each lane. Files go one after the other; models keep one loaded; computing uses what is left.
-fn threads_of(lane: Lane) -> usize {
-    match lane {
-        Lane::Files | Lane::Models | Lane::Batch => 1,
-        Lane::Compute => std::thread::available_parallelism().map_or(1, |n| n.get().saturating_sub(1).clamp(1, 4)),
+/// Threads of each worker. Files go one after the other; models keep one loaded; computing uses what is left.
+fn threads_of(worker: Worker) -> usize {
+    match worker {
+        Worker::Files | Worker::Models | Worker::Batch => 1,
+        Worker::Compute => std::thread::available_parallelism().map_or(1, |n| n.get().saturating_sub(1).clamp(1, 4)),
     }
 }
 
-impl Lanes {
+impl Workers {
     pub(super) fn new(threaded: bool, sender: &Sender<Event>, wake: &Wake) -> Self {
-        let lanes: Vec<Arc<LaneState>> =
-            Lane::iter().map(|_| Arc::new(LaneState { queue: Mutex::default(), filled: Condvar::new() })).collect();
+        let workers: Vec<Arc<WorkerState>> =
+            Worker::iter().map(|_| Arc::new(WorkerState { queue: Mutex::default(), filled: Condvar::new() })).collect();
         let mut threads = Vec::new();
-        for lane in Lane::iter().filter(|_| threaded) {
-            for _ in 0..threads_of(lane) {
-                let (state, sender, wake) = (lanes[lane as usize].clone(), sender.clone(), wake.clone());
+        for worker in Worker::iter().filter(|_| threaded) {
+            for _ in 0..threads_of(worker) {
+                let (state, sender, wake) = (workers[worker as usize].clone(), sender.clone(), wake.clone());
                 let thread = std::thread::Builder::new()
-                    .name(lane.name().to_owned())
+                    .name(worker.name().to_owned())
                     .spawn(move || work(&state, &sender, &wake))
                     .expect("the system gives a program a handful of threads");
-                threads.push((lane, thread));
+                threads.push((worker, thread));
             }
         }
-        Self { lanes, threads, sender: sender.clone(), demanded: Vec::new(), threaded }
+        Self { workers, threads, sender: sender.clone(), demanded: Vec::new(), threaded }
     }
 
     /// Queues a job; one of the same name that waits is replaced and keeps its place.
-    pub(super) fn submit(&self, lane: Lane, job: Job) {
-        let state = &self.lanes[lane as usize];
+    pub(super) fn submit(&self, worker: Worker, job: Job) {
+        let state = &self.workers[worker as usize];
         let mut queue = lock(&state.queue);
         match queue.ordered.iter_mut().find(|waiting| waiting.id == job.id) {
             Some(waiting) => *waiting = job,
@@ -113,7 +113,7 @@ impl Lanes {
 
     /// Takes a waiting job off its queue.
     pub(super) fn withdraw(&self, id: &JobId) -> Option<Job> {
-        self.lanes.iter().find_map(|state| {
+        self.workers.iter().find_map(|state| {
             let mut queue = lock(&state.queue);
             let at = queue.ordered.iter().position(|job| job.id == *id)?;
             queue.ordered.remove(at)
@@ -127,7 +127,7 @@ impl Lanes {
         mut prepare: impl FnMut(&Request) -> Option<(DatasetSeq, jobs::Job<Computed>)>,
     ) {
         let started: BTreeSet<Request> = self
-            .lanes
+            .workers
             .iter()
             .flat_map(|state| lock(&state.queue).started.keys().cloned().collect::<Vec<_>>())
             .collect();
@@ -135,18 +135,18 @@ impl Lanes {
             return;
         }
         // What runs for nobody is told to stop; what cannot stop ends and lands under its key.
-        for state in &self.lanes {
+        for state in &self.workers {
             for (request, cancel) in &lock(&state.queue).started {
                 if !wanted.contains(request) {
                     cancel.cancel();
                 }
             }
         }
-        let mut fresh: Vec<VecDeque<Job>> = self.lanes.iter().map(|_| VecDeque::new()).collect();
+        let mut fresh: Vec<VecDeque<Job>> = self.workers.iter().map(|_| VecDeque::new()).collect();
         for request in wanted.iter().filter(|r| !started.contains(r)) {
-            let Some((seq, jobs::Job { lane, what, body })) = prepare(request) else { continue };
+            let Some((seq, jobs::Job { worker, what, body })) = prepare(request) else { continue };
             let failed = request.clone();
-            fresh[lane as usize].push_back(Job {
+            fresh[worker as usize].push_back(Job {
                 id: JobId::Request(request.clone()),
                 what,
                 cx: JobCx::unwatched(),
@@ -154,7 +154,7 @@ impl Lanes {
                 failed: Box::new(move |err| Answer::RequestFailed(seq, Box::new(failed), err)),
             });
         }
-        for (state, mut jobs) in self.lanes.iter().zip(fresh) {
+        for (state, mut jobs) in self.workers.iter().zip(fresh) {
             let mut queue = lock(&state.queue);
             // A thread may have started one since `started` was read.
             jobs.retain(|job| !matches!(&job.id, JobId::Request(r) if queue.started.contains_key(r)));
@@ -167,7 +167,7 @@ impl Lanes {
     /// True where everything wanted runs or waits already.
     fn all_placed(&self, wanted: &[Request], started: &BTreeSet<Request>) -> bool {
         let waiting: BTreeSet<Request> = self
-            .lanes
+            .workers
             .iter()
             .flat_map(|state| {
                 let queue = lock(&state.queue);
@@ -184,54 +184,54 @@ impl Lanes {
     /// The answer of a job was handled.
     pub(super) fn forget(&mut self, id: &JobId) {
         if let JobId::Request(request) = id {
-            for state in &self.lanes {
+            for state in &self.workers {
                 lock(&state.queue).started.remove(request);
             }
         }
     }
 
-    pub(super) fn run_one(&self, lane: Lane) -> bool {
+    pub(super) fn run_one(&self, worker: Worker) -> bool {
         if self.threaded {
             return false;
         }
-        let job = lock(&self.lanes[lane as usize].queue).pop();
+        let job = lock(&self.workers[worker as usize].queue).pop();
         match job {
             Some(job) => {
-                send(&self.sender, execute(job));
+                drop(self.sender.send(execute(job)));
                 true
             }
             None => false,
         }
     }
 
-    pub(super) fn waiting(&self, lane: Lane) -> usize {
-        let queue = lock(&self.lanes[lane as usize].queue);
+    pub(super) fn waiting(&self, worker: Worker) -> usize {
+        let queue = lock(&self.workers[worker as usize].queue);
         queue.ordered.len() + queue.demanded.len()
     }
 
     /// Lets the threads end. Files that wait to be written are written first; nothing else is waited for.
     pub(super) fn close(&mut self) {
-        for lane in Lane::iter() {
-            let state = &self.lanes[lane as usize];
+        for worker in Worker::iter() {
+            let state = &self.workers[worker as usize];
             let mut queue = lock(&state.queue);
             queue.closing = true;
-            if lane != Lane::Files {
+            if worker != Worker::Files {
                 queue.ordered.clear();
             }
             state.filled.notify_all();
         }
-        for (lane, thread) in self.threads.drain(..) {
-            if lane == Lane::Files && thread.join().is_err() {
-                log::error!("the files lane ended early");
+        for (worker, thread) in self.threads.drain(..) {
+            if worker == Worker::Files && thread.join().is_err() {
+                log::error!("the files worker ended early");
             }
         }
         // Without threads the files are written here.
-        while self.run_one(Lane::Files) {}
+        while self.run_one(Worker::Files) {}
     }
 }
 
-/// The loop of a lane's thread.
-fn work(state: &LaneState, sender: &Sender<Event>, wake: &Wake) {
+/// The loop of a worker's thread.
+fn work(state: &WorkerState, sender: &Sender<Event>, wake: &Wake) {
     loop {
         let job = {
             let mut queue = lock(&state.queue);
@@ -245,14 +245,10 @@ fn work(state: &LaneState, sender: &Sender<Event>, wake: &Wake) {
                 queue = state.filled.wait(queue).unwrap_or_else(std::sync::PoisonError::into_inner);
             }
         };
-        send(sender, execute(job));
+        // Nobody listens any more where the runtime is gone.
+        drop(sender.send(execute(job)));
         wake();
     }
-}
-
-fn send(sender: &Sender<Event>, event: Event) {
-    // The runtime is gone: so is everybody who would care.
-    drop(sender.send(event));
 }
 
 fn execute(job: Job) -> Event {
@@ -266,4 +262,27 @@ fn execute(job: Job) -> Event {
         }
     };
     Event { id, answer: outcome.unwrap_or_else(failed) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use touch2touch_pipeline::error::TaskErrorKind;
+
+    #[test]
+    fn a_panic_in_a_job_is_its_failure_and_the_worker_goes_on() {
+        let (sender, events) = std::sync::mpsc::channel();
+        let wake: Wake = Arc::new(|| {});
+        let workers = Workers::new(false, &sender, &wake);
+        let submit = |id, body: Body<Answer>| {
+            let (what, failed) = ("Load".to_owned(), Box::new(Answer::JobFailed));
+            workers.submit(Worker::Files, Job { id, what, cx: JobCx::unwatched(), body, failed });
+        };
+        submit(JobId::Bundles, Box::new(|_| panic!("the file bit back")));
+        submit(JobId::Reveal, Box::new(|_| Ok(Answer::Done)));
+        assert!(workers.run_one(Worker::Files) && workers.run_one(Worker::Files) && !workers.run_one(Worker::Files));
+        let answers: Vec<Answer> = events.try_iter().map(|event| event.answer).collect();
+        let [Answer::JobFailed(err), Answer::Done] = &answers[..] else { panic!("{answers:?}") };
+        assert!(err.kind == TaskErrorKind::Panicked && err.why.contains("the file bit back"), "{err}");
+    }
 }

@@ -4,7 +4,7 @@
 //! draws (remote desktops, virtual machines) spends up to a fifth of a second on it. So there the triangles of a frame
 //! are compared with those of the frame before, tile by tile: a tile whose triangles are the same, in the same order and
 //! over unchanged textures, has the same pixels. The others are painted into a picture that stays, and the window shows
-//! that one picture. What lies under something opaque is not painted at all.
+//! that one picture.
 
 use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -17,38 +17,29 @@ use eframe::egui::{
 };
 use eframe::egui_wgpu::{Callback, CallbackResources, CallbackTrait, RenderState};
 
-use crate::gpu::sheet::{self, Corner, Fill, Run, TriangleSheet};
+use crate::gpu::raster::{Corner, Fill, FramePicture, Raster, Run};
 use crate::gpu::{Gpu, GpuError, wgpu};
 
 /// Side of a tile, physical pixels.
 const TILE: u32 = 32;
-/// Rectangles that are painted in one frame; more are joined.
-const RECTS: usize = 8;
+/// Rectangles that are painted in one frame; of more the one around them is.
+const RECTS: usize = 64;
 /// Triangles around which at least so many pixels lie are painted by their kind; smaller ones all alike, which is less
 /// to switch between.
 const LARGE_PX: f32 = 4096.0;
 
 /// Paints what changed. A plugin of the toolkit: it takes each frame's shapes and textures and gives one picture back.
-pub(crate) struct KeptFrame {
+pub(crate) struct FrameCache {
     gpu: Gpu,
     format: wgpu::TextureFormat,
-    sheet: TriangleSheet,
-    picture: Option<Arc<sheet::FramePicture>>,
+    raster: Raster,
+    picture: Option<Arc<FramePicture>>,
     /// Changes of each texture so far.
     versions: BTreeMap<TextureId, u64>,
-    /// Triangles that each tile was painted from.
-    tiles: Vec<Tile>,
+    /// Of each tile the hash of all triangles that touch it.
+    tiles: Vec<u64>,
     /// Pixels painted so far.
     painted: u64,
-}
-
-/// Content of a tile.
-#[derive(Clone, Copy, Default, PartialEq, Eq)]
-struct Tile {
-    /// Of all triangles that touch it and are not hidden.
-    hash: u64,
-    /// The first triangle of something opaque that hides all before it; `None` = there is nothing like that.
-    first: Option<usize>,
 }
 
 /// A triangle of a primitive.
@@ -69,10 +60,6 @@ struct Block {
 }
 
 impl Block {
-    fn area(self) -> u32 {
-        (self.max[0] - self.min[0]) * (self.max[1] - self.min[1])
-    }
-
     fn join(self, other: Self) -> Self {
         Self {
             min: [self.min[0].min(other.min[0]), self.min[1].min(other.min[1])],
@@ -82,7 +69,7 @@ impl Block {
 }
 
 /// The kept picture on the window.
-struct Shown(Arc<sheet::FramePicture>);
+struct Shown(Arc<FramePicture>);
 
 impl CallbackTrait for Shown {
     fn paint(&self, _: PaintCallbackInfo, pass: &mut wgpu::RenderPass<'static>, _: &CallbackResources) {
@@ -90,7 +77,7 @@ impl CallbackTrait for Shown {
     }
 }
 
-impl KeptFrame {
+impl FrameCache {
     /// Installs itself in `ctx`; returns whether it did: only where a program draws and the window has plain bytes.
     ///
     /// # Errors
@@ -102,16 +89,16 @@ impl KeptFrame {
         if !gpu.software || !plain {
             return Ok(false);
         }
-        let mut sheet = TriangleSheet::new(&gpu, format)?;
-        sheet.prove(&gpu, format)?;
+        let mut raster = Raster::new(&gpu, format)?;
+        raster.prove(&gpu, format)?;
         let (versions, tiles) = (BTreeMap::new(), Vec::new());
-        ctx.add_plugin(Self { gpu, format, sheet, picture: None, versions, tiles, painted: 0 });
+        ctx.add_plugin(Self { gpu, format, raster, picture: None, versions, tiles, painted: 0 });
         Ok(true)
     }
 
     /// Shows `view`, which a 3D view draws, where the toolkit shows `texture`.
     pub(crate) fn show(&mut self, texture: TextureId, view: &wgpu::TextureView) {
-        self.sheet.show(&self.gpu, key(texture), view);
+        self.raster.show(&self.gpu, key(texture), view);
         self.touch(texture);
     }
 
@@ -141,10 +128,10 @@ impl KeptFrame {
                 match delta.pos {
                     None => {
                         let nearest = delta.options.magnification == TextureFilter::Nearest;
-                        self.sheet.set(&self.gpu, key(id), size, &rgba, nearest);
+                        self.raster.set(&self.gpu, key(id), size, &rgba, nearest);
                     }
                     Some(place) => {
-                        if !self.sheet.set_part(&self.gpu, key(id), place.map(|p| p as u32), size, &rgba) {
+                        if !self.raster.set_part(&self.gpu, key(id), place.map(|p| p as u32), size, &rgba) {
                             log::error!("a part of texture {id:?} came before the whole");
                         }
                     }
@@ -154,12 +141,12 @@ impl KeptFrame {
     }
 
     /// The picture of this size; a new one, and every tile to be painted, if there is none.
-    fn picture(&mut self, size: [u32; 2]) -> Arc<sheet::FramePicture> {
+    fn picture(&mut self, size: [u32; 2]) -> Arc<FramePicture> {
         match &self.picture {
             Some(picture) if picture.size() == size => picture.clone(),
             _ => {
                 self.tiles.clear();
-                let picture = Arc::new(self.sheet.picture(&self.gpu, size, self.format));
+                let picture = Arc::new(self.raster.picture(&self.gpu, size, self.format));
                 self.picture = Some(picture.clone());
                 picture
             }
@@ -167,7 +154,7 @@ impl KeptFrame {
     }
 }
 
-/// The toolkit's name of a texture as the sheet's.
+/// The toolkit's name of a texture as the raster's.
 fn key(id: TextureId) -> u64 {
     match id {
         TextureId::Managed(n) => 2 * n,
@@ -175,9 +162,9 @@ fn key(id: TextureId) -> u64 {
     }
 }
 
-impl Plugin for KeptFrame {
+impl Plugin for FrameCache {
     fn debug_name(&self) -> &'static str {
-        "KeptFrame"
+        "FrameCache"
     }
 
     fn output_hook(&mut self, ctx: &Context, output: &mut FullOutput) {
@@ -193,26 +180,21 @@ impl Plugin for KeptFrame {
         if size[0] > 0 && size[1] > 0 {
             let picture = self.picture(size);
             let grid = size.map(|s| s.div_ceil(TILE));
-            let triangles = triangles(&primitives, &self.sheet, ppp, size);
+            let triangles = triangles(&primitives, ppp, size);
             let tiles = tiles(&primitives, &triangles, &self.versions, grid);
-            let blocks = blocks(grid, |tile| self.tiles.get(tile).is_none_or(|old| old.hash != tiles[tile].hash));
+            let blocks = blocks(grid, |tile| self.tiles.get(tile).is_none_or(|old| *old != tiles[tile]));
             let mut jobs = FrameMesh { ppp, size, ..FrameMesh::default() };
             for block in &blocks {
                 let [x0, y0] = block.min.map(|v| v * TILE);
                 let [x1, y1] = [0, 1].map(|axis| (block.max[axis] * TILE).min(size[axis]));
                 self.painted += u64::from(x1 - x0) * u64::from(y1 - y0);
                 let part = Rect::from_min_max(pos2(x0 as f32, y0 as f32), pos2(x1 as f32, y1 as f32));
-                let rows = block.min[1]..block.max[1];
-                let places = rows.flat_map(|y| (block.min[0]..block.max[0]).map(move |x| (y * grid[0] + x) as usize));
-                let first = places.map(|tile| tiles[tile].first).min().flatten();
-                if first.is_none() {
-                    jobs.ground(part);
-                }
-                jobs.within(&primitives, &triangles[first.unwrap_or(0)..], part);
+                jobs.ground(part);
+                jobs.within(&primitives, &triangles, part);
             }
             self.tiles = tiles;
             if !jobs.runs.is_empty()
-                && let Err(error) = self.sheet.paint(&self.gpu, &picture, &jobs.corners, &jobs.indices, &jobs.runs)
+                && let Err(error) = self.raster.paint(&self.gpu, &picture, &jobs.corners, &jobs.indices, &jobs.runs)
             {
                 log::error!("{error}");
                 self.tiles.clear();
@@ -225,13 +207,13 @@ impl Plugin for KeptFrame {
         freed.sort();
         for id in freed {
             // Its version stays: the name may be given again.
-            self.sheet.free(key(id));
+            self.raster.free(key(id));
         }
     }
 }
 
 /// All triangles that can be seen, in the order in which they are painted.
-fn triangles(primitives: &[ClippedPrimitive], sheet: &TriangleSheet, ppp: f32, size: [u32; 2]) -> Vec<Triangle> {
+fn triangles(primitives: &[ClippedPrimitive], ppp: f32, size: [u32; 2]) -> Vec<Triangle> {
     let screen = Rect::from_min_size(Pos2::ZERO, vec2(size[0] as f32, size[1] as f32));
     let mut all = Vec::new();
     for (index, job) in primitives.iter().enumerate() {
@@ -242,7 +224,6 @@ fn triangles(primitives: &[ClippedPrimitive], sheet: &TriangleSheet, ppp: f32, s
             continue;
         }
         let key = key(mesh.texture_id);
-        let picture = sheet.is_opaque(key);
         for corners in mesh.indices.chunks_exact(3) {
             let corners = [corners[0], corners[1], corners[2]];
             let Some(three) = vertices(mesh, corners) else { continue };
@@ -251,15 +232,8 @@ fn triangles(primitives: &[ClippedPrimitive], sheet: &TriangleSheet, ppp: f32, s
             if !bounds.is_positive() {
                 continue;
             }
-            let fill = if bounds.area() < LARGE_PX {
-                Fill::Textured { key, opaque: false }
-            } else {
-                let opaque = three.iter().all(|v| v.color.is_opaque());
-                match mesh.texture_id == TextureId::default() && three.iter().all(|v| v.uv == WHITE_UV) {
-                    true => Fill::Flat { opaque },
-                    false => Fill::Textured { key, opaque: opaque && picture },
-                }
-            };
+            let one_color = mesh.texture_id == TextureId::default() && three.iter().all(|v| v.uv == WHITE_UV);
+            let fill = if one_color && bounds.area() >= LARGE_PX { Fill::Flat } else { Fill::Textured(key) };
             all.push(Triangle { primitive: index, corners, bounds, fill });
         }
     }
@@ -277,40 +251,27 @@ fn vertices(mesh: &Mesh, corners: [u32; 3]) -> Option<[Vertex; 3]> {
     Some([at(corners[0])?, at(corners[1])?, at(corners[2])?])
 }
 
-/// Content of every tile, row by row.
+/// The hash of what touches each tile, row by row.
 fn tiles(
     primitives: &[ClippedPrimitive],
     triangles: &[Triangle],
     versions: &BTreeMap<TextureId, u64>,
     grid: [u32; 2],
-) -> Vec<Tile> {
-    let mut tiles = vec![Tile::default(); (grid[0] * grid[1]) as usize];
-    let mut last = None;
-    let (mut seed, mut vertices) = (0, Vec::new());
-    for (index, triangle) in triangles.iter().enumerate() {
-        let job = &primitives[triangle.primitive];
-        if last != Some(triangle.primitive) {
-            last = Some(triangle.primitive);
-            (seed, vertices) = hashes(job, versions);
-        }
-        let corner = |i: u32| vertices.get(i as usize).copied().unwrap_or_default();
-        let hash = triangle.corners.iter().fold(seed, |sum, i| mix(sum, corner(*i)));
-        // A quad that hides all below it.
-        let cover = index.checked_sub(1).and_then(|before| covered(primitives, &triangles[before], triangle));
-        let b = triangle.bounds;
-        let [x0, y0] = [b.min.x, b.min.y].map(|v| (v / TILE as f32).floor().max(0.0) as u32);
-        let [x1, y1] = [b.max.x, b.max.y].map(|v| (v / TILE as f32).ceil() as u32);
-        for y in y0..y1.min(grid[1]) {
-            for x in x0..x1.min(grid[0]) {
-                let tile = &mut tiles[(y * grid[0] + x) as usize];
-                let whole = |r: Rect| {
-                    let place = pos2((x * TILE) as f32, (y * TILE) as f32);
-                    r.contains_rect(Rect::from_min_size(place, vec2(TILE as f32, TILE as f32)))
-                };
-                if cover.is_some_and(whole) {
-                    *tile = Tile { hash: 0, first: Some(index - 1) };
+) -> Vec<u64> {
+    let mut tiles = vec![0; (grid[0] * grid[1]) as usize];
+    for of_one in triangles.chunk_by(|a, b| a.primitive == b.primitive) {
+        let (seed, vertices) = hashes(&primitives[of_one[0].primitive], versions);
+        for triangle in of_one {
+            let corner = |i: u32| vertices.get(i as usize).copied().unwrap_or_default();
+            let hash = triangle.corners.iter().fold(seed, |sum, i| mix(sum, corner(*i)));
+            let b = triangle.bounds;
+            let [x0, y0] = [b.min.x, b.min.y].map(|v| (v / TILE as f32).floor().max(0.0) as u32);
+            let [x1, y1] = [b.max.x, b.max.y].map(|v| (v / TILE as f32).ceil() as u32);
+            for y in y0..y1.min(grid[1]) {
+                for x in x0..x1.min(grid[0]) {
+                    let tile = &mut tiles[(y * grid[0] + x) as usize];
+                    *tile = mix(*tile, hash);
                 }
-                tile.hash = mix(tile.hash, hash);
             }
         }
     }
@@ -338,32 +299,7 @@ fn mix(a: u64, b: u64) -> u64 {
     m ^ (m >> 29)
 }
 
-/// Rectangle that two triangles in a row make and hide together, where both are opaque, physical pixels.
-fn covered(primitives: &[ClippedPrimitive], a: &Triangle, b: &Triangle) -> Option<Rect> {
-    let opaque = matches!(a.fill, Fill::Flat { opaque: true } | Fill::Textured { opaque: true, .. });
-    if !opaque || a.primitive != b.primitive || a.fill != b.fill || a.bounds != b.bounds {
-        return None;
-    }
-    let Primitive::Mesh(mesh) = &primitives[a.primitive].primitive else { return None };
-    let all = [vertices(mesh, a.corners)?, vertices(mesh, b.corners)?].map(|three| three.map(|v| v.pos));
-    let around = Rect::from_points(&all.concat());
-    // Each triangle has three corners of the rectangle; together they have all four if those they lack face each other.
-    let mut seen = [0_u8; 2];
-    for (triangle, seen) in all.iter().zip(&mut seen) {
-        for p in triangle {
-            let (right, below) = (p.x == around.max.x, p.y == around.max.y);
-            if !(right || p.x == around.min.x) || !(below || p.y == around.min.y) {
-                return None;
-            }
-            *seen |= 1 << (u8::from(right) + 2 * u8::from(below));
-        }
-    }
-    // One bit per corner; facing corners are bits 0 and 3, and 1 and 2.
-    matches!([15 - seen[0], 15 - seen[1]], [1, 8] | [8, 1] | [2, 4] | [4, 2]).then_some(a.bounds)
-}
-
-/// Rectangles around all tiles that changed, at most [`RECTS`]. They may lie over each other: what is painted twice is
-/// painted the same.
+/// Rectangles around all tiles that changed: runs of a row, joined with the same run of the row above.
 fn blocks(grid: [u32; 2], changed: impl Fn(usize) -> bool) -> Vec<Block> {
     let mut blocks: Vec<Block> = Vec::new();
     for y in 0..grid[1] {
@@ -384,28 +320,9 @@ fn blocks(grid: [u32; 2], changed: impl Fn(usize) -> bool) -> Vec<Block> {
             }
         }
     }
-    // So many that trying all pairs would take longer than painting: neighbors first.
-    while blocks.len() > 6 * RECTS {
-        blocks = blocks.chunks(2).map(|two| two.iter().skip(1).fold(two[0], |sum, b| sum.join(*b))).collect();
-    }
-    // Those that cost least to join are joined, until they are few.
-    loop {
-        let mut best: Option<(i64, usize, usize)> = None;
-        for i in 0..blocks.len() {
-            for j in 0..i {
-                let joined = blocks[i].join(blocks[j]);
-                let cost = i64::from(joined.area()) - i64::from(blocks[i].area()) - i64::from(blocks[j].area());
-                if best.is_none_or(|(least, _, _)| cost < least) {
-                    best = Some((cost, i, j));
-                }
-            }
-        }
-        let Some((cost, i, j)) = best else { return blocks };
-        if blocks.len() <= RECTS && cost > 0 {
-            return blocks;
-        }
-        let taken = blocks.swap_remove(i);
-        blocks[j] = blocks[j].join(taken);
+    match blocks.iter().copied().reduce(Block::join) {
+        Some(around) if blocks.len() > RECTS => vec![around],
+        _ => blocks,
     }
 }
 
@@ -441,23 +358,19 @@ impl FrameMesh {
         }
     }
 
-    /// Paints the ground of `part` (physical pixels), where nothing hides what was there before.
+    /// Paints the ground of `part` (physical pixels) over what was there before.
     fn ground(&mut self, part: Rect) {
         let places = [part.left_top(), part.right_top(), part.right_bottom(), part.left_bottom()];
         let [a, b, c, d] =
             places.map(|p| self.corner(Vertex { pos: p / self.ppp, uv: WHITE_UV, color: Color32::BLACK }));
-        self.triangle([a, b, c], part, Fill::Flat { opaque: true });
-        self.triangle([a, c, d], part, Fill::Flat { opaque: true });
+        self.triangle([a, b, c], part, Fill::Flat);
+        self.triangle([a, c, d], part, Fill::Flat);
     }
 
     /// `triangles` as far as they lie in `part` (physical pixels).
     fn within(&mut self, primitives: &[ClippedPrimitive], triangles: &[Triangle], part: Rect) {
-        let mut rest = triangles;
-        while let Some(front) = rest.first() {
-            let of_one = rest.iter().take_while(|t| t.primitive == front.primitive).count();
-            let (these, others) = rest.split_at(of_one);
-            rest = others;
-            let job = &primitives[front.primitive];
+        for these in triangles.chunk_by(|a, b| a.primitive == b.primitive) {
+            let job = &primitives[these[0].primitive];
             let clip = in_pixels(job.clip_rect, self.ppp).intersect(part);
             let Primitive::Mesh(mesh) = &job.primitive else { continue };
             if !clip.is_positive() {

@@ -1,0 +1,257 @@
+//! The pane that holds any two imprints of a touch against each other.
+
+mod choose;
+mod figures;
+
+use crate::app::results;
+use crate::app::settings::prefer;
+use eframe::egui::{self, Align2, Color32, Rect, Ui, UiBuilder, pos2, vec2};
+use strum::IntoEnumIterator as _;
+
+use super::images::{absent_text, bar, canvas, failed, finger_text, hover, paint_depth, scale_note, window};
+use crate::app::action::{Action, with_keys};
+use crate::app::keys::ComparisonKey;
+use crate::app::pane::Pane;
+use crate::app::settings::{CompareChoice, CompareMode};
+use crate::app::state::Lookup;
+use crate::ui::parts::cx::Cx;
+use crate::ui::parts::theme::{Palette, SMALL};
+use crate::ui::parts::widget::colorbar;
+use crate::ui::parts::widget::image_canvas::{CanvasOutput, Primary, shows_squares};
+use crate::ui::parts::widget::texture::{Histogram, depth_image};
+use touch2touch_core::colormap::{ColorMap, Range};
+use touch2touch_core::grid::DepthMap;
+use touch2touch_core::rig::{PadId, SensorKind};
+use touch2touch_core::units;
+use touch2touch_pipeline::compare::subject::Subject;
+
+/// Nothing is kept between frames.
+pub(crate) type Memory = ();
+
+/// One of the two.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+enum Letter {
+    A,
+    B,
+}
+
+impl Letter {
+    fn of(self, chosen: &CompareChoice) -> &Subject {
+        match self {
+            Self::A => &chosen.a,
+            Self::B => &chosen.b,
+        }
+    }
+}
+
+/// The color of one of the two: that of its side where it has one, and never that of the other.
+fn color(p: &Palette, chosen: &CompareChoice, letter: Letter) -> Color32 {
+    let (own, other) = match letter {
+        Letter::A => (&chosen.a, &chosen.b),
+        Letter::B => (&chosen.b, &chosen.a),
+    };
+    match (own, letter) {
+        (Subject::Measured, _) if *other != Subject::Measured || letter == Letter::A => p.truth,
+        (_, Letter::A) => p.prediction,
+        _ if *other == Subject::Measured => p.prediction,
+        _ => p.second,
+    }
+}
+
+/// True while the key is held that shows B in the place of A.
+fn flickers(ui: &Ui) -> bool {
+    let held = ui.input(|i| i.key_down(egui::Key::F) && i.modifiers.is_none());
+    held && !ui.ctx().egui_wants_keyboard_input()
+}
+
+pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
+    let chosen = cx.state.settings.compared();
+    egui::Frame::new().inner_margin(egui::Margin::symmetric(6, 3)).show(ui, |ui| {
+        header(cx, ui, &chosen);
+        // The error's figures stand in the metrics, and in its corner.
+        if !chosen.is_error() {
+            figures::show(cx, ui, &chosen);
+        }
+    });
+    let flipped = flickers(ui);
+    let full = ui.available_rect_before_wrap();
+    ui.advance_cursor_after_rect(full);
+    let area = full.with_max_y((full.bottom() - colorbar::HEIGHT).max(full.top() + 16.0));
+    let shown = cx.state.fingers();
+    let fingers: Vec<PadId> = cx.state.rig().pads().filter(|f| shown.contains(f)).collect();
+    let height = area.height() / fingers.len().max(1) as f32;
+    let mut histogram = None;
+    for (i, finger) in fingers.iter().enumerate() {
+        let rect = Rect::from_min_size(area.min + vec2(0.0, height * i as f32), vec2(area.width(), height - 1.0));
+        let parts = match chosen.mode {
+            CompareMode::Side => {
+                let half = vec2((rect.width() * 0.5 - 0.5).max(8.0), rect.height());
+                let right = Rect::from_min_size(pos2(rect.right() - half.x, rect.top()), half);
+                vec![(Letter::A, Rect::from_min_size(rect.min, half)), (Letter::B, right)]
+            }
+            CompareMode::Difference => vec![(Letter::A, rect)],
+        };
+        for (letter, rect) in parts {
+            let mut child = ui.new_child(UiBuilder::new().max_rect(rect).id_salt(("compared", *finger, letter)));
+            child.set_clip_rect(rect.intersect(ui.clip_rect()));
+            let drawn = match chosen.mode {
+                CompareMode::Difference => difference(cx, &mut child, &chosen, *finger),
+                CompareMode::Side => {
+                    let letter = if flipped { Letter::B } else { letter };
+                    picture(cx, &mut child, &chosen, letter, *finger)
+                }
+            };
+            histogram = drawn.or(histogram);
+        }
+    }
+    let rect = Rect::from_min_max(pos2(full.left(), area.bottom()), full.max);
+    ui.painter().rect_filled(rect, 0.0, cx.p.panel);
+    let mut child = ui.new_child(UiBuilder::new().max_rect(rect.shrink2(vec2(6.0, 0.0))).id_salt("compared bar"));
+    match chosen.mode {
+        CompareMode::Difference => bar::error_bar(cx, &mut child, histogram.as_ref()),
+        CompareMode::Side => bar::color_bar(cx, &mut child, histogram.as_ref()),
+    }
+}
+
+/// Choice of what is compared, and how.
+fn header(cx: &mut Cx<'_>, ui: &mut Ui, chosen: &CompareChoice) {
+    ui.spacing_mut().item_spacing = vec2(3.0, 3.0);
+    ui.spacing_mut().button_padding = vec2(4.0, 1.0);
+    ui.style_mut().override_font_id = Some(egui::FontId::proportional(SMALL));
+    let width = ui.available_width();
+    ui.horizontal_wrapped(|ui| {
+        for letter in [Letter::A, Letter::B] {
+            if let Some(subject) = choose::list(cx, ui, chosen, letter, (width - MODE - 34.0) / 2.0) {
+                cx.push(match letter {
+                    Letter::A => prefer(move |s| s.compare_mut().a = subject.clone()),
+                    Letter::B => prefer(move |s| s.compare_mut().b = subject.clone()),
+                });
+            }
+        }
+        modes(cx, ui, chosen);
+    });
+}
+
+/// Width of the choice of the way, points.
+const MODE: f32 = 64.0;
+
+/// Choice of the way, with the keys that stand for the rest.
+fn modes(cx: &mut Cx<'_>, ui: &mut Ui, chosen: &CompareChoice) {
+    let combo = egui::ComboBox::from_id_salt("compared by").width(MODE).selected_text(chosen.mode.name());
+    let response = combo.show_ui(ui, |ui| {
+        for mode in CompareMode::iter() {
+            if ui.selectable_label(chosen.mode == mode, mode.name()).on_hover_text(mode.tooltip()).clicked() {
+                cx.push(prefer(move |s| s.compare_mut().mode = mode));
+            }
+        }
+        ui.separator();
+        cx.action_button(ui, Action::SwapCompared, "Swap A and B");
+    });
+    let tip = "{} ([[compare_mode]]: next, [[swap_compared]]: swap, hold F: B in the place of A)";
+    let tip = with_keys(&tip.replace("{}", chosen.mode.tooltip()));
+    response.response.accessible_name("Comparison").on_hover_text(tip);
+}
+
+/// Placeholder for a picture.
+fn instead(cx: &mut Cx<'_>, ui: &mut Ui, lookup: Lookup<'_, DepthMap>) {
+    match lookup {
+        Lookup::Failed(err) => failed(cx, ui, err),
+        Lookup::Absent(absent) => absent_text(cx, ui, absent),
+        Lookup::Ready(_) | Lookup::Stale(_) | Lookup::Waiting => {
+            let rect = ui.available_rect_before_wrap();
+            ui.painter().rect_filled(rect, 0.0, cx.p.canvas);
+            let font = egui::FontId::proportional(12.0);
+            ui.painter().text(rect.center(), Align2::CENTER_CENTER, "Computing…", font, cx.p.weak);
+        }
+    }
+}
+
+/// The picture of one of the two.
+fn picture(cx: &mut Cx<'_>, ui: &mut Ui, chosen: &CompareChoice, letter: Letter, finger: PadId) -> Option<Histogram> {
+    let subject = letter.of(chosen);
+    let lookup = results::subject(cx.state, subject, finger);
+    let Some(depth) = lookup.shown() else {
+        instead(cx, ui, lookup);
+        return None;
+    };
+    let label = format!("Compare {letter:?} {}", cx.state.finger_name(finger));
+    let output = canvas(cx, ui, SensorKind::Depth, &label, depth.size(), Primary::Pan);
+    let recipe = results::subject_key(cx.state, subject, finger).ok()?;
+    let slot = ("compared", letter, finger);
+    let histogram = paint_depth(cx, ui, &output, (slot, &recipe), depth, Color32::WHITE);
+    over(cx, &output, chosen, finger);
+    let strong = color(cx.p, chosen, letter);
+    output.caption(Align2::LEFT_TOP, &format!("{letter:?}  {}", subject.label()), strong);
+    output.caption(Align2::LEFT_BOTTOM, &finger_text(cx.state, finger), Color32::from_gray(235));
+    output.caption(Align2::RIGHT_BOTTOM, scale_note(cx.state), crate::ui::parts::theme::DARK.caution);
+    histogram
+}
+
+/// A minus B.
+fn difference(cx: &mut Cx<'_>, ui: &mut Ui, chosen: &CompareChoice, finger: PadId) -> Option<Histogram> {
+    for subject in [&chosen.a, &chosen.b] {
+        let lookup = results::subject(cx.state, subject, finger);
+        if lookup.shown().is_none() {
+            instead(cx, ui, lookup);
+            return None;
+        }
+    }
+    let lookup = results::subjects_compared(cx.state, &chosen.a, &chosen.b, finger);
+    let Some(compared) = lookup.shown() else {
+        instead(cx, ui, lookup.map(|compared| &compared.error));
+        return None;
+    };
+    let label = format!("A minus B {}", cx.state.finger_name(finger));
+    let output = canvas(cx, ui, SensorKind::Depth, &label, compared.error.size(), Primary::Pan);
+    let squares = shows_squares(&output.map, ui.pixels_per_point());
+    let keys = [&chosen.a, &chosen.b].map(|subject| results::subject_key(cx.state, subject, finger));
+    let [Ok(a), Ok(b)] = keys else { return None };
+    let range = Range::symmetric(cx.shared.views.error_m());
+    let key = (ComparisonKey { a, b }, range.hi.to_bits());
+    let picture = cx.shared.textures.get(ui.ctx(), ("compared difference", finger), key, squares, || {
+        (depth_image(&compared.error, ColorMap::Diverging, range), Histogram::of(compared.error.as_slice()))
+    });
+    output.paint(picture.texture.id(), Color32::WHITE);
+    let histogram = picture.histogram.clone();
+    over(cx, &output, chosen, finger);
+    let light = Color32::from_gray(235);
+    // In a narrow pane the corners at the bottom have room for one line.
+    let finger_text = finger_text(cx.state, finger).to_lowercase();
+    let text = format!("{} minus {}, {finger_text}", chosen.a.label(), chosen.b.label());
+    output.caption(Align2::LEFT_TOP, &text, light);
+    output.caption(Align2::RIGHT_TOP, scale_note(cx.state), crate::ui::parts::theme::DARK.caution);
+    histogram
+}
+
+/// Overlay of every picture: GelSlim's window, cross-hair, the values under the pointer.
+fn over(cx: &mut Cx<'_>, output: &CanvasOutput, chosen: &CompareChoice, finger: PadId) {
+    window(cx, output, finger);
+    if let Some(px) = output.hovered {
+        readout(cx, output, chosen, finger, px);
+        hover(cx, finger, px);
+    }
+    if let Some(point) = cx.state.selection.hover.filter(|h| h.finger == finger) {
+        output.crosshair(point.at_px, Color32::WHITE);
+    }
+}
+
+/// The values of both under the pointer.
+fn readout(cx: &mut Cx<'_>, output: &CanvasOutput, chosen: &CompareChoice, finger: PadId, px: [f32; 2]) {
+    let Some((x, y)) = output.map.pixel(px) else { return };
+    let value = |subject: &Subject| {
+        let depth = results::subject(cx.state, subject, finger).shown()?;
+        depth.get(x, y).copied().filter(|v| v.is_finite()).map(f64::from)
+    };
+    let (a, b) = (value(&chosen.a), value(&chosen.b));
+    let text = |v: Option<f64>| v.map_or("–".to_owned(), units::text_mm);
+    let difference = a.zip(b).map(|(a, b)| a - b);
+    let note = scale_note(cx.state);
+    let note = if note.is_empty() { String::new() } else { format!("   ({note})") };
+    cx.shared.readout = Some(format!(
+        "Compare {} ({x}, {y})   A {}   B {}   A minus B {}{note}",
+        cx.state.finger_name(finger),
+        text(a),
+        text(b),
+        text(difference)
+    ));
+}
