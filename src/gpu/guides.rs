@@ -1,4 +1,4 @@
-//! Lines that give a scene its scale: a floor grid, the axes, a bar of known length, the edges of a box.
+//! Lines that give a scene its scale: a floor grid, the axes, the edges of a box.
 
 use glam::DVec3;
 
@@ -39,13 +39,6 @@ pub fn axes(origin: DVec3, length: f64) -> Vec<Segment> {
     out
 }
 
-/// A bar of `length` meters from `start` along the unit vector `along`, with end marks along the unit vector `mark`.
-pub fn scale_bar(start: DVec3, along: DVec3, mark: DVec3, length: f64, rgba: [u8; 4]) -> Vec<Segment> {
-    let end = start + along * length;
-    let half = mark * (0.12 * length);
-    [[start, end], [start - half, start + half], [end - half, end + half]].map(|ends| Segment { ends, rgba }).to_vec()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -56,8 +49,6 @@ mod tests {
 
     #[test]
     fn lengths_and_counts() {
-        let bar = scale_bar(DVec3::ONE, DVec3::X, DVec3::Z, 0.01, [255; 4]);
-        assert!((length(&bar[0]) - 0.01).abs() < 1e-15);
         let lines = grid(DVec3::ZERO, [DVec3::X, DVec3::Y], 0.005, 4, [90; 3]);
         assert_eq!(lines.len(), 18);
         assert!(lines.iter().all(|s| (length(s) - 0.04).abs() < 1e-15 && s.ends[0].z == 0.0));

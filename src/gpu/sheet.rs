@@ -9,6 +9,8 @@ use std::ops::Range;
 use bytemuck::{Pod, Zeroable};
 
 use super::buffer::Elements;
+use super::context::begin_color;
+use super::pipelines::{PipelineParts, filtered_texture, sampler};
 use super::{Gpu, GpuError, shaders, wgpu};
 
 /// A corner of a triangle.
@@ -102,73 +104,22 @@ impl TriangleSheet {
     /// For pictures and a window of `format`.
     ///
     /// # Errors
-    /// [`GpuError::Shader`] and [`GpuError::Device`].
+    /// [`GpuError::Device`].
     pub fn new(gpu: &Gpu, format: wgpu::TextureFormat) -> Result<Self, GpuError> {
-        let module = shaders::compile(gpu, "sheet.wgsl")?;
+        let module = shaders::compile(gpu, "sheet", shaders::SHEET)?;
         gpu.guarded("building the pipelines of the window", || {
-            let device = &gpu.device;
-            let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-                label: Some("TriangleSheet::layout"),
-                entries: &[
-                    wgpu::BindGroupLayoutEntry {
-                        binding: 0,
-                        visibility: wgpu::ShaderStages::FRAGMENT,
-                        ty: wgpu::BindingType::Texture {
-                            multisampled: false,
-                            sample_type: wgpu::TextureSampleType::Float { filterable: true },
-                            view_dimension: wgpu::TextureViewDimension::D2,
-                        },
-                        count: None,
-                    },
-                    wgpu::BindGroupLayoutEntry {
-                        binding: 1,
-                        visibility: wgpu::ShaderStages::FRAGMENT,
-                        ty: wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering),
-                        count: None,
-                    },
-                ],
-            });
-            let build = |label, [vertex, fragment]: [&str; 2], bound: bool, blend| {
-                let groups = [Some(&layout)];
-                let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-                    label: Some(label),
-                    bind_group_layouts: if bound { &groups } else { &[] },
-                    immediate_size: 0,
-                });
-                let corners = [Some(wgpu::VertexBufferLayout {
-                    array_stride: size_of::<Corner>() as u64,
-                    step_mode: wgpu::VertexStepMode::Vertex,
-                    attributes: &wgpu::vertex_attr_array![0 => Float32x2, 1 => Float32x2, 2 => Unorm8x4],
-                })];
-                device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-                    label: Some(label),
-                    layout: Some(&pipeline_layout),
-                    vertex: wgpu::VertexState {
-                        module: &module,
-                        entry_point: Some(vertex),
-                        compilation_options: wgpu::PipelineCompilationOptions::default(),
-                        buffers: if vertex == "vs_main" { &corners } else { &[] },
-                    },
-                    primitive: wgpu::PrimitiveState::default(),
-                    depth_stencil: None,
-                    multisample: wgpu::MultisampleState::default(),
-                    fragment: Some(wgpu::FragmentState {
-                        module: &module,
-                        entry_point: Some(fragment),
-                        compilation_options: wgpu::PipelineCompilationOptions::default(),
-                        targets: &[Some(wgpu::ColorTargetState { format, blend, write_mask: wgpu::ColorWrites::ALL })],
-                    }),
-                    multiview_mask: None,
-                    cache: None,
-                })
-            };
-            let sampler = |filter| {
-                device.create_sampler(&wgpu::SamplerDescriptor {
-                    label: Some("TriangleSheet::sampler"),
-                    mag_filter: filter,
-                    min_filter: filter,
-                    ..Default::default()
-                })
+            let layout = gpu.layout("TriangleSheet::layout", &[filtered_texture(0), sampler(1)]);
+            let corners = [Some(wgpu::VertexBufferLayout {
+                array_stride: size_of::<Corner>() as u64,
+                step_mode: wgpu::VertexStepMode::Vertex,
+                attributes: &wgpu::vertex_attr_array![0 => Float32x2, 1 => Float32x2, 2 => Unorm8x4],
+            })];
+            let build = |label, stages: [&str; 2], bound: bool, blend| {
+                let (layouts, vertices) =
+                    (&[&layout][..usize::from(bound)], &corners[..usize::from(stages[0] == "vs_main")]);
+                let target = wgpu::ColorTargetState { format, blend, write_mask: wgpu::ColorWrites::ALL };
+                let (module, depth, samples) = (&module, None, 1);
+                PipelineParts { label, module, stages, layouts, vertices, target, depth, samples }.build(gpu)
             };
             let two = |label, fragment: &str, bound| {
                 [Some(OVER), None].map(|blend| build(label, ["vs_main", fragment], bound, blend))
@@ -177,7 +128,8 @@ impl TriangleSheet {
                 flat: two("TriangleSheet::flat", "fs_flat", false),
                 textured: two("TriangleSheet::textured", "fs_tinted", true),
                 whole: build("TriangleSheet::whole", ["vs_whole", "fs_copied"], true, None),
-                samplers: [wgpu::FilterMode::Linear, wgpu::FilterMode::Nearest].map(sampler),
+                samplers: [wgpu::FilterMode::Linear, wgpu::FilterMode::Nearest]
+                    .map(|filter| gpu.sampler("TriangleSheet::sampler", filter)),
                 layout,
                 textures: BTreeMap::new(),
                 corners: None,
@@ -199,17 +151,8 @@ impl TriangleSheet {
     }
 
     fn bind(&self, gpu: &Gpu, view: &wgpu::TextureView, nearest: bool) -> wgpu::BindGroup {
-        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("TriangleSheet::texture"),
-            layout: &self.layout,
-            entries: &[
-                wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(view) },
-                wgpu::BindGroupEntry {
-                    binding: 1,
-                    resource: wgpu::BindingResource::Sampler(&self.samplers[usize::from(nearest)]),
-                },
-            ],
-        })
+        let sampler = wgpu::BindingResource::Sampler(&self.samplers[usize::from(nearest)]);
+        gpu.bind("TriangleSheet::texture", &self.layout, &[wgpu::BindingResource::TextureView(view), sampler])
     }
 
     /// An empty picture of `size` pixels and `format`, which must be that of the sheet.
@@ -276,16 +219,8 @@ impl TriangleSheet {
             let label = Some("TriangleSheet::encoder");
             let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label });
             {
-                let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                    label: Some("TriangleSheet::pass"),
-                    color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                        view: &picture.view,
-                        depth_slice: None,
-                        resolve_target: None,
-                        ops: wgpu::Operations { load: wgpu::LoadOp::Load, store: wgpu::StoreOp::Store },
-                    })],
-                    ..Default::default()
-                });
+                let load = wgpu::LoadOp::Load;
+                let mut pass = begin_color(&mut encoder, "TriangleSheet::pass", &picture.view, load);
                 pass.set_vertex_buffer(0, corners.buffer.slice(..));
                 pass.set_index_buffer(indices.buffer.slice(..), wgpu::IndexFormat::Uint32);
                 for run in runs {
@@ -309,23 +244,15 @@ impl TriangleSheet {
     }
 }
 
+/// A texture of at least one pixel.
 fn texture(
     gpu: &Gpu,
     label: &str,
-    [width, height]: [u32; 2],
+    size: [u32; 2],
     format: wgpu::TextureFormat,
     usage: wgpu::TextureUsages,
 ) -> wgpu::Texture {
-    gpu.device.create_texture(&wgpu::TextureDescriptor {
-        label: Some(label),
-        size: wgpu::Extent3d { width: width.max(1), height: height.max(1), depth_or_array_layers: 1 },
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format,
-        usage,
-        view_formats: &[],
-    })
+    gpu.texture(label, size.map(|s| s.max(1)), format, 1, usage)
 }
 
 fn write(gpu: &Gpu, texture: &wgpu::Texture, [x, y]: [u32; 2], [width, height]: [u32; 2], rgba: &[u8]) {
