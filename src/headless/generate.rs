@@ -151,7 +151,7 @@ fn score_color(difference: &RgbGrid, touch: &PadTouch, pair: &mut Pair) -> anyho
         let [w, h] = measured.difference.size();
         let sized = resample::bilinear_rgb(difference, w, h);
         let (psnr, ssim) = metrics::color(&sized, &measured.difference)?;
-        (pair.psnr_db, pair.ssim) = (psnr.db(), Some(ssim));
+        (pair.psnr_db, pair.ssim) = (psnr, Some(ssim));
     }
     Ok(())
 }

@@ -20,10 +20,6 @@ pub use rise::{rest_and_top, rise, stands_out};
 
 /// Distance to the CAD model that the lab still calls contact, meters (`ICP_dataset_cal.py` lines 337-391).
 pub const LAB_CAD_DISTANCE_M: f64 = 0.001;
-/// Imprint that the lab's networks map to 0, meters.
-pub const LAB_IMPRINT_MIN_M: f32 = -0.0116;
-/// Imprint that the lab's networks map to 1, meters.
-pub const LAB_IMPRINT_MAX_M: f32 = 0.0225;
 
 /// Pixels pushed in by at least `min_m` meters. Values that are not finite are no contact.
 pub fn threshold(imprint: &DepthMap, min_m: f32) -> Mask {
@@ -205,57 +201,6 @@ pub fn settled_model(imprint: &DepthMap, mask: Mask) -> ContactMask {
     }
 }
 
-/// Cast of a value outside 0..255 to a byte.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum ByteCast {
-    /// As numpy does it for the lab: modulo 256, so that a very deep pixel turns dark again.
-    Wrap,
-    /// Held at 0 and 255.
-    #[default]
-    Saturate,
-}
-
-/// The mask network's input with what was lost on the way.
-#[derive(Clone, Debug, PartialEq)]
-pub struct UnetInput {
-    /// Values in [0, 1], multiples of 1/255.
-    pub image: Grid<f32>,
-    /// Pixels that were NaN or infinite and count as an imprint of zero.
-    pub not_finite: usize,
-    /// Pixels outside the range that a byte holds.
-    pub out_of_range: usize,
-}
-
-/// The imprint as the lab's mask network sees it: scaled from [-11.6, 22.5] mm to [0, 1] and cut to 256 levels by
-/// truncation.
-///
-/// # Invalid values
-/// NaN and infinities are taken as an imprint of zero and counted; the lab does not expect them.
-///
-/// # Source
-/// `ICP_dataset_cal.py` lines 641-676; an image whose bytes are all 0 or 1 is, as there, not divided by 255.
-pub fn lab_unet_input(imprint: &DepthMap, cast: ByteCast) -> UnetInput {
-    let (mut not_finite, mut out_of_range) = (0, 0);
-    let bytes = imprint.map(|&d| {
-        let d = if d.is_finite() {
-            d
-        } else {
-            not_finite += 1;
-            0.0
-        };
-        let level = (d - LAB_IMPRINT_MIN_M) / (LAB_IMPRINT_MAX_M - LAB_IMPRINT_MIN_M) * 255.0;
-        if !(0.0..256.0).contains(&level) {
-            out_of_range += 1;
-        }
-        match cast {
-            ByteCast::Wrap => (level as i64) as u8,
-            ByteCast::Saturate => level as u8,
-        }
-    });
-    let scale = if bytes.as_slice().iter().any(|&b| b > 1) { 255.0 } else { 1.0 };
-    UnetInput { image: bytes.map(|&b| f32::from(b) / scale), not_finite, out_of_range }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -371,22 +316,5 @@ mod tests {
         assert!((row(&shifted) - row(&mask) - 0.01 / 0.09 * 211.0).abs() < 1.0);
         let dropped = DepthMap::filled(175, 140, f32::NAN);
         assert_eq!(count(&cad_signed_distance(&dropped, &camera, &bar, still, 0.001).unwrap()), 0);
-    }
-
-    #[test]
-    fn bytes_wrap_or_saturate_and_truncate() {
-        let imprint = DepthMap::from_vec(5, 1, vec![-0.013, 0.030, 0.0, f32::NAN, 0.0224]).unwrap();
-        let levels = |cast| {
-            let input = lab_unet_input(&imprint, cast);
-            assert_eq!((input.not_finite, input.out_of_range), (1, 2));
-            input.image.map(|v| (v * 255.0).round() as i32).into_vec()
-        };
-        // -13 mm reads 246 and 30 mm reads 55 in numpy; 0 is 86.7, truncated.
-        assert_eq!(levels(ByteCast::Wrap), [246, 55, 86, 86, 254]);
-        assert_eq!(levels(ByteCast::Saturate), [0, 255, 86, 86, 254]);
-        let dark = DepthMap::filled(2, 1, -0.01155);
-        assert_eq!(lab_unet_input(&dark, ByteCast::Wrap).image.into_vec(), [0.0, 0.0]);
-        let one = DepthMap::filled(2, 1, -0.0114);
-        assert_eq!(lab_unet_input(&one, ByteCast::Wrap).image.into_vec(), [1.0, 1.0], "the lab's quirk");
     }
 }

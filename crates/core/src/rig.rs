@@ -202,11 +202,6 @@ impl Rig {
         self.sensor(self.first(SensorKind::Depth)?)
     }
 
-    /// The first pad besides this one; `None` where there is no other.
-    pub fn other_pad(&self, pad: PadId) -> Option<PadId> {
-        self.pads().find(|other| *other != pad)
-    }
-
     /// True where the depth sensor sees a gel, whose depth follows the tool pixel by pixel, and no membrane, which spans
     /// between the parts that lift it: told by the key of the lab's own ([`lab::GELSLIM_DEPTH`]).
     pub fn is_gel(&self) -> bool {

@@ -18,11 +18,11 @@ use crate::grid::Mask;
     Hash,
     PartialOrd,
     Ord,
-    Serialize,
-    Deserialize,
     EnumIter,
     EnumString,
     IntoStaticStr,
+    Serialize,
+    Deserialize,
 )]
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]

@@ -14,11 +14,11 @@ use strum::{EnumIter, EnumString, IntoStaticStr};
     Hash,
     PartialOrd,
     Ord,
-    Serialize,
-    Deserialize,
     EnumIter,
     EnumString,
     IntoStaticStr,
+    Serialize,
+    Deserialize,
 )]
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]

@@ -43,7 +43,7 @@ pub struct Split {
 pub fn split(prediction: &Grid<f32>, truth: &Grid<f32>, seen: &Mask, peak: f64) -> Result<Split, MetricError> {
     check_size(prediction, truth)?;
     if seen.size() != truth.size() {
-        return Err(MetricError::Size { prediction: seen.size(), truth: truth.size() });
+        return Err(MetricError::Size(seen.size(), truth.size()));
     }
     let map = ssim(prediction, truth, SsimRange::Explicit(peak))?.map;
     let figures = |wanted: &dyn Fn(bool) -> bool| -> Result<PixelMetrics, MetricError> {
@@ -60,10 +60,7 @@ pub fn split(prediction: &Grid<f32>, truth: &Grid<f32>, seen: &Mask, peak: f64) 
             }
         }
         let mean = |total: f64| (pixels > 0).then(|| total / pixels as f64);
-        let psnr_db = match mean(squares) {
-            Some(mse) => psnr_of_mse(mse, peak)?.db(),
-            None => None,
-        };
+        let psnr_db = mean(squares).map(|mse| psnr_of_mse(mse, peak)).transpose()?.flatten();
         Ok(PixelMetrics { pixels, psnr_db, ssim: mean(similarity), mae: mean(sizes), bias: mean(sum) })
     };
     Ok(Split { whole: figures(&|_| true)?, seen: figures(&|seen| seen)?, invented: figures(&|seen| !seen)? })

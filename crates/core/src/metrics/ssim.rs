@@ -170,7 +170,7 @@ mod tests {
             };
             let value = |key: &str| case[key].as_f64().unwrap();
             let (prediction, truth, range) = (grid("prediction"), grid("truth"), value("range"));
-            let db = super::super::psnr(&prediction, &truth, range).unwrap().db().unwrap();
+            let db = super::super::psnr(&prediction, &truth, range).unwrap().unwrap();
             assert!((db - value("psnr")).abs() < 1e-6, "{db} for {}", value("psnr"));
         }
     }

@@ -131,8 +131,8 @@ pub(crate) fn contact_of(probability: &Grid<f32>, imprint: &DepthMap, least: f32
 
 /// The imprint as the graph wants it, `[1, 1, height, width]`.
 ///
-/// In f32 and truncated, as the lab's `(x - min) / (max - min) * 255` cast to `uint8`; with the lab's range the same as
-/// [`touch2touch_core::contact::lab_unet_input`], but for the manifest's range and size.
+/// In f32 and truncated, as the lab's `(x - min) / (max - min) * 255` cast to `uint8` (`ICP_dataset_cal.py` lines 641-676), but with the manifest's range
+/// and size.
 fn prepare(imprint: &DepthMap, input: &MaskInput) -> Tensor {
     let [width, height] = input.size;
     let filled = imprint.map(|&v| if v.is_finite() { v } else { 0.0 });
