@@ -21,15 +21,13 @@ pub enum SsimRange {
     OfPrediction,
 }
 
-/// A structural similarity.
+/// A structural similarity. Pixels that are not finite in one of the images count as equal.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ssim {
     /// The mean of the map, borders included: the lab's convention.
     pub mean: f64,
     /// The score of each pixel, -1 to 1.
     pub map: Grid<f32>,
-    /// Pixels that were not finite in one of the images and were counted as equal.
-    pub ignored: usize,
 }
 
 /// Structural similarity with an 11 × 11 Gaussian window (σ = 1.5), zero padding of 5 pixels, K1 = 0.01, K2 = 0.03.
@@ -88,7 +86,7 @@ pub fn ssim(prediction: &Grid<f32>, truth: &Grid<f32>, range: SsimRange) -> Resu
         .collect();
     let mean = scores.iter().sum::<f64>() / scores.len() as f64;
     let map = Grid::from_fn(width, height, |x, y| scores[y * width + x] as f32);
-    Ok(Ssim { mean, map, ignored: p.len() - used })
+    Ok(Ssim { mean, map })
 }
 
 /// The normalized Gaussian of the window, one axis.
@@ -139,20 +137,21 @@ mod tests {
         (prediction, truth)
     }
 
+    fn grid(case: &Value, key: &str) -> Grid<f32> {
+        let data = case[key].as_array().unwrap().iter().map(|v| v.as_f64().unwrap() as f32).collect();
+        let size = |k: &str| case[k].as_u64().unwrap() as usize;
+        Grid::from_vec(size("width"), size("height"), data).unwrap()
+    }
+
     #[test]
     fn agrees_with_an_independent_implementation() {
         let reference: Value = serde_json::from_str(include_str!("../../tests/data/ssim.json")).unwrap();
         for case in reference["cases"].as_array().unwrap() {
-            let grid = |key: &str| {
-                let data = case[key].as_array().unwrap().iter().map(|v| v.as_f64().unwrap() as f32).collect();
-                let size = |k: &str| case[k].as_u64().unwrap() as usize;
-                Grid::from_vec(size("width"), size("height"), data).unwrap()
-            };
             let range = match case["range"].as_f64() {
                 Some(range) => SsimRange::Explicit(range),
                 None => SsimRange::OfPrediction,
             };
-            let similarity = ssim(&grid("prediction"), &grid("truth"), range).unwrap();
+            let similarity = ssim(&grid(case, "prediction"), &grid(case, "truth"), range).unwrap();
             let expected = case["ssim"].as_f64().unwrap();
             // Both sides work in f64 on the same f32 pixels.
             assert!((similarity.mean - expected).abs() < 1e-9, "{} for {expected}", similarity.mean);
@@ -163,24 +162,19 @@ mod tests {
     fn the_psnr_is_that_of_scikit_image() {
         let reference: Value = serde_json::from_str(include_str!("../../tests/data/scikit_image.json")).unwrap();
         for case in reference["images"].as_array().unwrap() {
-            let grid = |key: &str| {
-                let data = case[key].as_array().unwrap().iter().map(|v| v.as_f64().unwrap() as f32).collect();
-                let size = |k: &str| case[k].as_u64().unwrap() as usize;
-                Grid::from_vec(size("width"), size("height"), data).unwrap()
-            };
             let value = |key: &str| case[key].as_f64().unwrap();
-            let (prediction, truth, range) = (grid("prediction"), grid("truth"), value("range"));
+            let (prediction, truth, range) = (grid(case, "prediction"), grid(case, "truth"), value("range"));
             let db = super::super::psnr(&prediction, &truth, range).unwrap().unwrap();
             assert!((db - value("psnr")).abs() < 1e-6, "{db} for {}", value("psnr"));
         }
     }
 
     #[test]
-    fn invalid_pixels_are_counted() {
+    fn invalid_pixels_are_left_out() {
         let (mut prediction, truth) = textured(0.0);
         prediction[(3, 3)] = f32::NAN;
         let similarity = ssim(&prediction, &truth, SsimRange::Explicit(0.0225)).unwrap();
-        assert!(similarity.ignored == 1 && similarity.mean.is_finite());
+        assert!(similarity.mean.is_finite());
         let none = Grid::filled(31, 24, f32::NAN);
         assert_eq!(ssim(&none, &truth, SsimRange::Explicit(1.0)), Err(MetricError::Nothing));
     }
