@@ -1,7 +1,5 @@
 // The edges of a mesh that a pencil would draw: creases, borders, and where the surface turns away from the eye.
 // Rust twins: gpu::edges::{EdgeVertex, EdgesUniform}.
-#import <common/view.wgsl>
-#import <common/stroke.wgsl>
 
 struct EdgeVertex {
     a: vec3<f32>,
@@ -23,7 +21,6 @@ struct EdgesUniform {
     creases: u32,
     // Pixels from the start of a dash to that of the next; 0 = a whole line.
     dash_px: f32,
-    unused: u32,
 }
 
 @group(1) @binding(0) var<uniform> edges: EdgesUniform;

@@ -1,6 +1,4 @@
 // Eye-dome lighting and ambient occlusion of a picture with several samples per pixel: the first one speaks for all.
-#import <common/view.wgsl>
-#import <common/edl.wgsl>
 
 @group(1) @binding(0) var depths: texture_multisampled_2d<f32>;
 

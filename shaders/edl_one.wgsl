@@ -1,6 +1,4 @@
 // Eye-dome lighting and ambient occlusion of a picture with one sample per pixel.
-#import <common/view.wgsl>
-#import <common/edl.wgsl>
 
 @group(1) @binding(0) var depths: texture_2d<f32>;
 

@@ -1,6 +1,4 @@
 // The floor: a disc that fades towards its rim, with the soft shadow of what stands over it.
-#import <common/view.wgsl>
-#import <common/floor.wgsl>
 
 @group(1) @binding(0) var<uniform> ground: FloorUniform;
 @group(1) @binding(1) var shadow: texture_2d<f32>;

@@ -1,7 +1,5 @@
 // Lines of a width in pixels: six vertices per segment, read from a storage buffer.
 // Rust twins: gpu::lines::{LineVertex, LinesUniform}.
-#import <common/view.wgsl>
-#import <common/stroke.wgsl>
 
 struct LineVertex {
     position: vec3<f32>,
@@ -13,8 +11,6 @@ struct LinesUniform {
     world_from_lines: mat4x4<f32>,
     width_px: f32,
     opacity: f32,
-    unused_0: f32,
-    unused_1: f32,
 }
 
 @group(1) @binding(0) var<uniform> lines: LinesUniform;

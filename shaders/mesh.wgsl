@@ -1,7 +1,4 @@
 // Lit triangle meshes: solid, translucent, a veil, or as an x-ray. Rust twins: gpu::mesh::{MeshVertex, MeshUniform}.
-#import <common/view.wgsl>
-#import <common/color.wgsl>
-#import <common/light.wgsl>
 
 // The share of its opacity that a veil keeps before something solid.
 const VEIL_THIN: f32 = 0.14;
@@ -20,8 +17,6 @@ struct MeshUniform {
     map: u32,
     // 1 = what a plane lays open is filled.
     closed: u32,
-    unused_0: u32,
-    unused_1: u32,
 }
 
 @group(1) @binding(0) var<uniform> mesh: MeshUniform;

@@ -1,8 +1,5 @@
 // Point clouds as discs that face the eye: six vertices per point, read from a storage buffer.
 // Rust twins: gpu::points::{PointVertex, PointsUniform}.
-#import <common/view.wgsl>
-#import <common/color.wgsl>
-#import <common/light.wgsl>
 
 struct PointVertex {
     position: vec3<f32>,
@@ -29,9 +26,6 @@ struct PointsUniform {
     drawn: u32,
     // Index of the highlighted point; 0xffffffff for none.
     selected: u32,
-    unused_0: u32,
-    unused_1: u32,
-    unused_2: u32,
 }
 
 @group(1) @binding(0) var<uniform> cloud: PointsUniform;

@@ -1,5 +1,4 @@
 // The shadow that a mesh throws on the floor, drawn from above, and its blur.
-#import <common/floor.wgsl>
 
 struct Caster {
     world_from_mesh: mat4x4<f32>,

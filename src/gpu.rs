@@ -21,11 +21,11 @@ pub mod pipelines;
 pub mod points;
 pub mod raster;
 pub mod scene;
-pub mod shaders;
 pub mod target;
 pub mod view;
 
 mod buffer;
+mod shaders;
 mod vertex;
 
 /// What can go wrong between a scene and its picture.
@@ -69,7 +69,4 @@ pub enum GpuError {
         /// Bytes that the device allows.
         limit: u64,
     },
-    /// A shader's text is wrong.
-    #[error(transparent)]
-    Shader(#[from] shaders::ShaderError),
 }

@@ -11,7 +11,7 @@ use glam::{DAffine3, DVec2, DVec3};
 use touch2touch::gpu::context::COLOR_FORMAT;
 use touch2touch::gpu::edges::EdgeStyle;
 use touch2touch::gpu::lines::{LinesItem, LinesStyle, Segment};
-use touch2touch::gpu::mesh::{self, Look, MeshItem, MeshStyle, Shading};
+use touch2touch::gpu::mesh::{Look, MeshItem, MeshStyle, Shading};
 use touch2touch::gpu::pipelines::Pipelines;
 use touch2touch::gpu::points::{CloudItem, CloudStyle, PointColors, PointSize};
 use touch2touch::gpu::raster::Raster;
@@ -93,7 +93,7 @@ fn mesh_item(mesh: TriMesh, style: MeshStyle) -> MeshItem {
         name: "mesh".into(),
         revision: 0,
         mesh: Arc::new(mesh),
-        shading: Shading::Flat,
+        shading: Shading::Smooth,
         values: Arc::default(),
         style,
     }
@@ -362,21 +362,41 @@ fn to_eye(camera: &Camera, p: DVec3) -> DVec3 {
     if camera.orthographic { camera.axes()[2] } else { (camera.eye() - p).normalize() }
 }
 
+/// Towards the key light.
+fn key_light(camera: &Camera) -> DVec3 {
+    let [right, up, back] = camera.axes();
+    (back + 0.55 * up - 0.45 * right).normalize()
+}
+
+/// Twin of the function in `shaders/common/light.wgsl`.
+fn light_on(normal: DVec3, camera: &Camera) -> f64 {
+    let facing = normal.dot(key_light(camera));
+    let key = ((facing + 0.2) / 1.2).clamp(0.0, 1.0);
+    let above = 0.5 + 0.5 * normal.dot(camera.axes()[1]);
+    0.14 + 0.20 * above * above + 0.62 * key.powf(1.5) + 0.08 * (-facing).clamp(0.0, 1.0)
+}
+
+/// Twin of the function in `shaders/common/light.wgsl`.
+fn gloss_on(normal: DVec3, to_eye: DVec3, camera: &Camera) -> f64 {
+    let halfway = normal.dot((key_light(camera) + to_eye).normalize()).clamp(0.0, 1.0);
+    0.03 * halfway.powi(8) + 0.11 * halfway.powi(40)
+}
+
 #[test]
 fn a_sphere_is_shaded_as_the_light_says() {
     let Some(mut view) = View::new() else { return };
     let style = MeshStyle { color: [0.8, 0.5, 0.3], ..MeshStyle::default() };
     for (revision, orthographic) in [(1, true), (2, false)] {
         view.camera = Camera { orthographic, ..Camera::default() };
-        let item = MeshItem { revision, shading: Shading::Smooth, ..mesh_item(sphere(0.02, 64), style) };
+        let item = MeshItem { revision, ..mesh_item(sphere(0.02, 64), style) };
         let picture = view.picture(&SceneData { meshes: vec![item], ..scene() });
         let [right, up, back] = view.camera.axes();
         let mut brightest = (0u8, 0.0);
         for (a, b) in [(0.0, 0.0), (-0.5, 0.5), (0.5, 0.3), (0.4, -0.6), (-0.2, -0.7)] {
             let normal: DVec3 = (right * a + up * b + back * (1.0f64 - a * a - b * b).sqrt()).normalize();
             let [x, y] = view.pixel(normal * 0.02);
-            let light = mesh::light_on(normal, &view.camera);
-            let gloss = mesh::gloss_on(normal, to_eye(&view.camera, normal * 0.02), &view.camera);
+            let light = light_on(normal, &view.camera);
+            let gloss = gloss_on(normal, to_eye(&view.camera, normal * 0.02), &view.camera);
             let found = picture.rgb(x, y).unwrap();
             for (channel, color) in style.color.into_iter().enumerate() {
                 let wanted = 255.0 * encoded(decoded(f64::from(color)) * light + gloss);
@@ -404,8 +424,8 @@ fn distances_on_a_surface_have_the_colors_of_their_cpu_twin() {
         let item = MeshItem { revision, values, ..mesh_item(mesh, style) };
         let [x, y] = view.pixel(DVec3::ZERO);
         let found = view.picture(&SceneData { meshes: vec![item], ..scene() }).rgb(x, y).unwrap();
-        let light = mesh::light_on(back, &view.camera);
-        let gloss = mesh::gloss_on(back, back, &view.camera);
+        let light = light_on(back, &view.camera);
+        let gloss = gloss_on(back, back, &view.camera);
         let (color, light, gloss) = match value.is_nan() {
             true => ([0.5; 3], light, gloss),
             false => (map.rgb(range.unit(value)), 0.5 + 0.5 * light, 0.0),
@@ -423,7 +443,7 @@ fn a_plane_cuts_meshes_and_points_and_fills_what_it_lays_open() {
     view.camera = Camera { orthographic: true, ..Camera::default() };
     let back = view.camera.axes()[2];
     let style = MeshStyle { color: [0.9, 0.1, 0.1], ..MeshStyle::default() };
-    let ball = MeshItem { shading: Shading::Smooth, ..mesh_item(sphere(0.02, 32), style) };
+    let ball = MeshItem { ..mesh_item(sphere(0.02, 32), style) };
     let inner = cloud(&[back * 0.012], &[[0, 255, 0]], PointSize::Px(9.0));
     let mut picture = |cut: Vec<Plane>, closed: bool| {
         let mesh = MeshItem { style: MeshStyle { closed, ..style }, ..ball.clone() };

@@ -1,7 +1,6 @@
 // What shows the shape of a picture from its depths alone. Eye-dome lighting (Boucheny 2009): what lies behind its neighbors on
 // the screen is darkened, so that clouds show their depth. Ambient occlusion: what lies in a hollow is darkened. Both are
 // without chance, so that nothing flickers while the view turns. Depths are clip depths; 0 = nothing was drawn there.
-#import <common/view.wgsl>
 
 // Meters behind a neighbor, per meter of the eye's distance, that darken to 1/e.
 const REACH: f32 = 0.012;

@@ -9,7 +9,4 @@ struct FloorUniform {
     light: vec4<f32>,
     // Opacity of the deepest shadow.
     shadow: f32,
-    unused_0: f32,
-    unused_1: f32,
-    unused_2: f32,
 }

@@ -1,7 +1,5 @@
 // One studio light for everything that has a surface, as if painted on a ball (a matcap): it turns with the eye, so that
-// shapes read the same from every side. CPU twins: gpu::mesh::{light_on, gloss_on}.
-#import <common/view.wgsl>
-#import <common/color.wgsl>
+// shapes read the same from every side. CPU twins: {light_on, gloss_on} of tests/gpu.rs.
 
 // The share of its color that a surface shows: a wide key light, a sky, and a weak light from below on the far side. The
 // sum stays below 1, so that the color stays itself.

@@ -1,5 +1,4 @@
 // Straight lines of a width in pixels, with soft rims: they stay smooth with one sample per pixel.
-#import <common/view.wgsl>
 
 struct Stroke {
     clip: vec4<f32>,

@@ -12,6 +12,8 @@ struct ViewUniform {
     key_in_world: vec4<f32>,
     // How clip depth becomes meters in front of the eye, see meters_of.
     depth: vec4<f32>,
+    // Normal and offset: what has dot(normal, p) + offset < 0 is cut away.
+    planes: array<vec4<f32>, 8>,
     size_px: vec2<f32>,
     // Pixels per meter where clip w = 1; divide by clip w for any other place.
     px_per_m: f32,
@@ -19,11 +21,6 @@ struct ViewUniform {
     plane_count: u32,
     // Pixels that stand for one pixel of a screen: a still of four times the size has lines of four times the width.
     unit_px: f32,
-    unused_0: f32,
-    unused_1: f32,
-    unused_2: f32,
-    // Normal and offset: what has dot(normal, p) + offset < 0 is cut away.
-    planes: array<vec4<f32>, 8>,
 }
 
 @group(0) @binding(0) var<uniform> view: ViewUniform;

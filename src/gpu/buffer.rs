@@ -2,6 +2,7 @@
 
 use bytemuck::Pod;
 
+use super::pipelines::Pipelines;
 use super::{Gpu, GpuError, wgpu};
 
 /// One struct of numbers for the shaders.
@@ -16,7 +17,8 @@ impl<T: Pod + PartialEq> Uniform<T> {
     pub(super) fn new(gpu: &Gpu, label: &str) -> Self {
         let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some(label),
-            size: size_of::<T>() as u64,
+            // As the shaders count it.
+            size: size_of::<T>().next_multiple_of(16) as u64,
             usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
@@ -73,5 +75,44 @@ impl Elements {
         });
         gpu.queue.write_buffer(&buffer, 0, bytemuck::cast_slice(elements));
         Ok(Self { buffer, count })
+    }
+}
+
+/// One item of a scene on the device: its elements, the numbers that go with them, and both as its shader takes them.
+#[derive(Debug)]
+pub(super) struct Item<K, U> {
+    uploaded: K,
+    pub(super) elements: Elements,
+    pub(super) uniform: Uniform<U>,
+    pub(super) bindings: wgpu::BindGroup,
+}
+
+impl<K: PartialEq, U: Pod + PartialEq> Item<K, U> {
+    /// Uploads the elements unless `old` holds what `wanted` names; returns whether it did. Storage is bound, vertices are not.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`].
+    pub(super) fn upload<T: Pod>(
+        (gpu, pipelines): (&Gpu, &Pipelines),
+        label: [&str; 2],
+        old: Option<Self>,
+        wanted: K,
+        usage: wgpu::BufferUsages,
+        elements: impl FnOnce() -> Vec<T>,
+    ) -> Result<(Self, bool), GpuError> {
+        let (buffer, uniform) = match old {
+            Some(item) if item.uploaded == wanted => return Ok((item, false)),
+            old => old.map_or((None, None), |item| (Some(item.elements.buffer), Some(item.uniform))),
+        };
+        let label = label.join("::");
+        let elements = Elements::upload(gpu, &label, &elements(), usage, buffer)?;
+        let uniform = uniform.unwrap_or_else(|| Uniform::new(gpu, &label));
+        let numbers = uniform.buffer.as_entire_binding();
+        let bindings = if usage.contains(wgpu::BufferUsages::STORAGE) {
+            gpu.bind(&label, &pipelines.pulled_layout, &[numbers, elements.buffer.as_entire_binding()])
+        } else {
+            gpu.bind(&label, &pipelines.plain_layout, &[numbers])
+        };
+        Ok((Self { uploaded: wanted, elements, uniform, bindings }, true))
     }
 }

@@ -110,6 +110,50 @@ impl Gpu {
         }
     }
 
+    /// A texture of one level.
+    pub(super) fn texture(
+        &self,
+        label: &str,
+        [width, height]: [u32; 2],
+        format: wgpu::TextureFormat,
+        sample_count: u32,
+        usage: wgpu::TextureUsages,
+    ) -> wgpu::Texture {
+        self.device.create_texture(&wgpu::TextureDescriptor {
+            label: Some(label),
+            size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count,
+            dimension: wgpu::TextureDimension::D2,
+            format,
+            usage,
+            view_formats: &[],
+        })
+    }
+
+    /// Reads between the pixels of a texture as `filter` says.
+    pub(super) fn sampler(&self, label: &str, filter: wgpu::FilterMode) -> wgpu::Sampler {
+        let label = Some(label);
+        let settings = wgpu::SamplerDescriptor { label, mag_filter: filter, min_filter: filter, ..Default::default() };
+        self.device.create_sampler(&settings)
+    }
+
+    pub(super) fn layout(&self, label: &str, entries: &[wgpu::BindGroupLayoutEntry]) -> wgpu::BindGroupLayout {
+        self.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries })
+    }
+
+    /// Binds resources as number 0, 1 and so on.
+    pub(super) fn bind(
+        &self,
+        label: &str,
+        layout: &wgpu::BindGroupLayout,
+        resources: &[wgpu::BindingResource<'_>],
+    ) -> wgpu::BindGroup {
+        let entry = |(binding, resource)| wgpu::BindGroupEntry { binding, resource };
+        let entries: Vec<_> = (0..).zip(resources.iter().cloned()).map(entry).collect();
+        self.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some(label), layout, entries: &entries })
+    }
+
     /// Largest buffer for a usage, bytes. A device without storage buffers still has vertices and indices.
     pub(super) fn max_bytes(&self, usage: wgpu::BufferUsages) -> u64 {
         let limits = self.device.limits();
@@ -143,6 +187,19 @@ fn best_adapter() -> Result<wgpu::Adapter, GpuError> {
     let power_preference = wgpu::PowerPreference::HighPerformance;
     let options = wgpu::RequestAdapterOptions { power_preference, ..Default::default() };
     block_on(instance.request_adapter(&options)).map_err(|e| GpuError::NoAdapter(e.to_string()))
+}
+
+/// Starts a pass that draws color alone into a picture of one sample per pixel.
+pub(super) fn begin_color<'e>(
+    encoder: &'e mut wgpu::CommandEncoder,
+    label: &str,
+    view: &wgpu::TextureView,
+    load: wgpu::LoadOp<wgpu::Color>,
+) -> wgpu::RenderPass<'e> {
+    let ops = wgpu::Operations { load, store: wgpu::StoreOp::Store };
+    let color = wgpu::RenderPassColorAttachment { view, depth_slice: None, resolve_target: None, ops };
+    let (label, color_attachments) = (Some(label), &[Some(color)][..]);
+    encoder.begin_render_pass(&wgpu::RenderPassDescriptor { label, color_attachments, ..Default::default() })
 }
 
 /// Waits for a future. The futures of the native back ends are ready at once; this is all the executor they need.

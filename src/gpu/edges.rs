@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
-use super::buffer::{Elements, Uniform};
+use super::buffer::Item;
 use super::pipelines::Pipelines;
 use super::vertex::{CREASE_RAD, place};
 use super::{Gpu, GpuError, view, wgpu};
@@ -47,17 +47,10 @@ pub(super) struct EdgesUniform {
     pub(super) width_px: f32,
     pub(super) creases: u32,
     pub(super) dash_px: f32,
-    pub(super) unused: u32,
 }
 
-/// The edges of one mesh on the device.
-#[derive(Debug)]
-pub(super) struct EdgeData {
-    uploaded: u64,
-    list: Elements,
-    uniform: Uniform<EdgesUniform>,
-    bindings: wgpu::BindGroup,
-}
+/// The edges of one mesh on the device, by its revision.
+pub(super) type EdgeData = Item<u64, EdgesUniform>;
 
 impl EdgeData {
     /// Uploads what changed since `old`. Returns whether edges were uploaded, and whether numbers were.
@@ -71,17 +64,9 @@ impl EdgeData {
         (name, revision, mesh): (&str, u64, &TriMesh),
         (world_from_mesh, style): ([f32; 16], &EdgeStyle),
     ) -> Result<(Self, [bool; 2]), GpuError> {
-        let (mut data, uploaded) = match old {
-            Some(data) if data.uploaded == revision => (data, false),
-            old => {
-                let label = format!("Edges::{name}");
-                let (buffer, uniform) = old.map_or((None, None), |d| (Some(d.list.buffer), Some(d.uniform)));
-                let list = Elements::upload(gpu, &label, &edges(mesh), wgpu::BufferUsages::STORAGE, buffer)?;
-                let uniform = uniform.unwrap_or_else(|| Uniform::new(gpu, &label));
-                let bindings = pipelines.bind(gpu, &label, &uniform.buffer, Some(&list.buffer));
-                (Self { uploaded: revision, list, uniform, bindings }, true)
-            }
-        };
+        let (on, label) = ((gpu, pipelines), ["Edges", name]);
+        let usage = wgpu::BufferUsages::STORAGE;
+        let (mut data, uploaded) = Item::upload(on, label, old, revision, usage, || edges(mesh))?;
         let [r, g, b] = style.color;
         let written = data.uniform.set(
             gpu,
@@ -91,7 +76,6 @@ impl EdgeData {
                 width_px: if style.width_px.is_finite() { style.width_px.max(0.5) } else { 1.0 },
                 creases: u32::from(style.creases),
                 dash_px: if style.dash_px.is_finite() { style.dash_px.max(0.0) } else { 0.0 },
-                unused: 0,
             },
         );
         Ok((data, [uploaded, written]))
@@ -100,7 +84,7 @@ impl EdgeData {
     /// Draws with the view bound to group 0.
     pub(super) fn draw(&self, pass: &mut wgpu::RenderPass<'_>) {
         pass.set_bind_group(1, &self.bindings, &[]);
-        pass.draw(0..6, 0..self.list.count);
+        pass.draw(0..6, 0..self.elements.count);
     }
 }
 

@@ -5,7 +5,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
 use super::buffer::Uniform;
-use super::context::SHADOW_FORMAT;
+use super::context::{SHADOW_FORMAT, begin_color};
 use super::pipelines::Pipelines;
 use super::{Gpu, wgpu};
 
@@ -37,9 +37,6 @@ pub(super) struct FloorUniform {
     pub(super) center: [f32; 4],
     pub(super) light: [f32; 4],
     pub(super) shadow: f32,
-    pub(super) unused_0: f32,
-    pub(super) unused_1: f32,
-    pub(super) unused_2: f32,
 }
 
 /// Something that throws a shadow: its name, the revision of its mesh, and its pose.
@@ -62,33 +59,23 @@ impl FloorData {
     /// A floor without a shadow yet.
     pub(super) fn new(gpu: &Gpu, pipelines: &Pipelines) -> Self {
         let uniform: Uniform<FloorUniform> = Uniform::new(gpu, "Floor::uniform");
+        let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING;
         let texture = |label| {
-            let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
-                label: Some(label),
-                size: wgpu::Extent3d { width: SIDE, height: SIDE, depth_or_array_layers: 1 },
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format: SHADOW_FORMAT,
-                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
-                view_formats: &[],
-            });
+            let texture = gpu.texture(label, [SIDE; 2], SHADOW_FORMAT, 1, usage);
             texture.create_view(&wgpu::TextureViewDescriptor::default())
         };
         let shadow = [texture("Floor::shadow"), texture("Floor::blurred")];
         let blurred = [&shadow[0], &shadow[1]].map(|view| {
-            gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: Some("Floor::blur"),
-                layout: &pipelines.picture_layout,
-                entries: &[wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(view) }],
-            })
+            gpu.bind("Floor::blur", &pipelines.picture_layout, &[wgpu::BindingResource::TextureView(view)])
         });
-        let ground = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("Floor::ground"),
-            layout: &pipelines.view_layout,
-            entries: &[wgpu::BindGroupEntry { binding: 0, resource: uniform.buffer.as_entire_binding() }],
-        });
-        let shown = pipelines.bind_floor(gpu, &uniform.buffer, &shadow[0]);
+        let buffer = uniform.buffer.as_entire_binding();
+        let ground = gpu.bind("Floor::ground", &pipelines.view_layout, std::slice::from_ref(&buffer));
+        let shown = [
+            buffer,
+            wgpu::BindingResource::TextureView(&shadow[0]),
+            wgpu::BindingResource::Sampler(&pipelines.floor_sampler),
+        ];
+        let shown = gpu.bind("Floor::shown", &pipelines.floor_layout, &shown);
         Self { uniform, ground, shown, shadow, blurred, thrown_by: None }
     }
 
@@ -103,9 +90,6 @@ impl FloorData {
                 center: [x, y, z, (floor.reach_m as f32).max(1e-4)],
                 light: [LIGHT[0], LIGHT[1], LIGHT[2], 0.0],
                 shadow: floor.shadow.clamp(0.0, 1.0),
-                unused_0: 0.0,
-                unused_1: 0.0,
-                unused_2: 0.0,
             },
         );
         if written {
@@ -125,8 +109,9 @@ impl FloorData {
         if self.thrown_by.as_deref() == Some(casters) {
             return;
         }
+        let clear = wgpu::LoadOp::Clear(wgpu::Color::BLACK);
         {
-            let mut pass = begin(encoder, &self.shadow[0]);
+            let mut pass = begin_color(encoder, "Floor::pass", &self.shadow[0], clear);
             pass.set_pipeline(&pipelines.shadow);
             pass.set_bind_group(0, &self.ground, &[]);
             for (name, ..) in casters {
@@ -134,7 +119,7 @@ impl FloorData {
             }
         }
         for (from, to, pipeline) in [(0, 1, &pipelines.shadow_across), (1, 0, &pipelines.shadow_down)] {
-            let mut pass = begin(encoder, &self.shadow[to]);
+            let mut pass = begin_color(encoder, "Floor::pass", &self.shadow[to], clear);
             pass.set_pipeline(pipeline);
             pass.set_bind_group(0, &self.ground, &[]);
             pass.set_bind_group(1, &self.blurred[from], &[]);
@@ -148,18 +133,4 @@ impl FloorData {
         pass.set_bind_group(1, &self.shown, &[]);
         pass.draw(0..6, 0..1);
     }
-}
-
-/// Starts a pass into one of the shadow's textures.
-fn begin<'e>(encoder: &'e mut wgpu::CommandEncoder, view: &wgpu::TextureView) -> wgpu::RenderPass<'e> {
-    encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-        label: Some("Floor::pass"),
-        color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-            view,
-            depth_slice: None,
-            resolve_target: None,
-            ops: wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color::BLACK), store: wgpu::StoreOp::Store },
-        })],
-        ..Default::default()
-    })
 }

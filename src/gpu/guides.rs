@@ -1,4 +1,4 @@
-//! Lines that give a scene its scale: a floor grid, the axes, a bar of known length, the edges of a box.
+//! Lines that give a scene its scale: a floor grid, the axes, the edges of a box.
 
 use glam::DVec3;
 

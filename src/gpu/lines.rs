@@ -5,7 +5,7 @@ use std::sync::Arc;
 use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, DVec3};
 
-use super::buffer::{Elements, Uniform};
+use super::buffer::Item;
 use super::pipelines::Pipelines;
 use super::{Gpu, GpuError, view, wgpu};
 
@@ -65,18 +65,10 @@ pub(super) struct LinesUniform {
     pub(super) world_from_lines: [f32; 16],
     pub(super) width_px: f32,
     pub(super) opacity: f32,
-    pub(super) unused_0: f32,
-    pub(super) unused_1: f32,
 }
 
-/// Lines on the device.
-#[derive(Debug)]
-pub(super) struct LinesData {
-    uploaded: u64,
-    ends: Elements,
-    uniform: Uniform<LinesUniform>,
-    bindings: wgpu::BindGroup,
-}
+/// Lines on the device, by their revision.
+pub(super) type LinesData = Item<u64, LinesUniform>;
 
 impl LinesData {
     /// Uploads what changed since `old`. Returns whether lines were uploaded, and whether numbers were.
@@ -89,26 +81,15 @@ impl LinesData {
         old: Option<Self>,
         item: &LinesItem,
     ) -> Result<(Self, [bool; 2]), GpuError> {
-        let (mut data, uploaded) = match old {
-            Some(data) if data.uploaded == item.revision => (data, false),
-            old => {
-                let label = format!("Lines::{}", item.name);
-                let (buffer, uniform) = old.map_or((None, None), |d| (Some(d.ends.buffer), Some(d.uniform)));
-                let usage = wgpu::BufferUsages::STORAGE;
-                let ends = Elements::upload(gpu, &label, &vertices(&item.segments), usage, buffer)?;
-                let uniform = uniform.unwrap_or_else(|| Uniform::new(gpu, &label));
-                let bindings = pipelines.bind(gpu, &label, &uniform.buffer, Some(&ends.buffer));
-                (Self { uploaded: item.revision, ends, uniform, bindings }, true)
-            }
-        };
+        let (on, label) = ((gpu, pipelines), ["Lines", &item.name]);
+        let usage = wgpu::BufferUsages::STORAGE;
+        let (mut data, uploaded) = Item::upload(on, label, old, item.revision, usage, || vertices(&item.segments))?;
         let written = data.uniform.set(
             gpu,
             LinesUniform {
                 world_from_lines: view::matrix(&item.style.world_from_lines),
                 width_px: if item.style.width_px.is_finite() { item.style.width_px.max(0.5) } else { 1.0 },
                 opacity: item.style.opacity.clamp(0.0, 1.0),
-                unused_0: 0.0,
-                unused_1: 0.0,
             },
         );
         Ok((data, [uploaded, written]))
@@ -117,7 +98,7 @@ impl LinesData {
     /// Draws with the view bound to group 0.
     pub(super) fn draw(&self, pass: &mut wgpu::RenderPass<'_>) {
         pass.set_bind_group(1, &self.bindings, &[]);
-        pass.draw(0..6, 0..self.ends.count / 2);
+        pass.draw(0..6, 0..self.elements.count / 2);
     }
 }
 

@@ -6,11 +6,10 @@ use std::sync::Arc;
 use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, DVec3};
 
-use super::buffer::{Elements, Uniform};
+use super::buffer::Item;
 use super::edges::{EdgeData, EdgeStyle};
 use super::pipelines::Pipelines;
 use super::vertex::{CREASE_RAD, MeshVertex, drawable, place};
-use super::view::Camera;
 use super::{Gpu, GpuError, view, wgpu};
 use touch2touch_core::colormap::{ColorMap, Range};
 use touch2touch_core::mesh::TriMesh;
@@ -35,8 +34,6 @@ pub struct MeshItem {
 /// Shading: how normals are made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Shading {
-    /// Every triangle by itself.
-    Flat,
     /// Rounded over edges of less than 40°, sharp over others.
     #[default]
     Smooth,
@@ -106,34 +103,13 @@ pub(super) struct MeshUniform {
     pub(super) hi: f32,
     pub(super) map: u32,
     pub(super) closed: u32,
-    pub(super) unused_0: u32,
-    pub(super) unused_1: u32,
-}
-
-/// Brightness of a surface, 0..1, for a unit normal towards the eye, with the directions of the camera. Twin of the
-/// function in `shaders/common/light.wgsl`.
-pub fn light_on(normal: DVec3, camera: &Camera) -> f64 {
-    let [_, up, _] = camera.axes();
-    let facing = normal.dot(camera.key_light());
-    let key = ((facing + 0.2) / 1.2).clamp(0.0, 1.0);
-    let above = 0.5 + 0.5 * normal.dot(up);
-    0.14 + 0.20 * above * above + 0.62 * key.powf(1.5) + 0.08 * (-facing).clamp(0.0, 1.0)
-}
-
-/// White light that a surface mirrors towards the eye, 0..1, linear; `to_eye` is a unit vector. Twin of the function in
-/// `shaders/common/light.wgsl`.
-pub fn gloss_on(normal: DVec3, to_eye: DVec3, camera: &Camera) -> f64 {
-    let halfway = normal.dot((camera.key_light() + to_eye).normalize()).clamp(0.0, 1.0);
-    0.03 * halfway.powi(8) + 0.11 * halfway.powi(40)
 }
 
 /// A mesh on the device.
 #[derive(Debug)]
 pub(super) struct MeshData {
-    pub(super) uploaded: (u64, Shading),
-    vertices: Elements,
-    uniform: Uniform<MeshUniform>,
-    bindings: wgpu::BindGroup,
+    /// By revision.
+    item: Item<(u64, Shading), MeshUniform>,
     edges: Option<EdgeData>,
 }
 
@@ -149,19 +125,10 @@ impl MeshData {
         item: &MeshItem,
     ) -> Result<(Self, [bool; 2]), GpuError> {
         let wanted = (item.revision, item.shading);
-        let (mut data, uploaded) = match old {
-            Some(data) if data.uploaded == wanted => (data, false),
-            old => {
-                let label = format!("Mesh::{}", item.name);
-                let (buffer, uniform, edges) =
-                    old.map_or((None, None, None), |d| (Some(d.vertices.buffer), Some(d.uniform), d.edges));
-                let corners = vertices(&item.mesh, item.shading, &item.values);
-                let vertices = Elements::upload(gpu, &label, &corners, wgpu::BufferUsages::VERTEX, buffer)?;
-                let uniform = uniform.unwrap_or_else(|| Uniform::new(gpu, &label));
-                let bindings = pipelines.bind(gpu, &label, &uniform.buffer, None);
-                (Self { uploaded: wanted, vertices, uniform, bindings, edges }, true)
-            }
-        };
+        let (old, old_edges) = old.map_or((None, None), |data| (Some(data.item), data.edges));
+        let (on, label) = ((gpu, pipelines), ["Mesh", &item.name]);
+        let corners = || vertices(&item.mesh, item.shading, &item.values);
+        let (mut data, uploaded) = Item::upload(on, label, old, wanted, wgpu::BufferUsages::VERTEX, corners)?;
         let style = &item.style;
         let [r, g, b] = style.color;
         let world_from_mesh = view::matrix(&style.world_from_mesh);
@@ -177,26 +144,24 @@ impl MeshData {
                 hi: range.hi,
                 map: style.map as u32,
                 closed: u32::from(style.closed),
-                unused_0: 0,
-                unused_1: 0,
             },
         );
         let mut did = [uploaded, written];
-        let old = data.edges.take();
-        if let Some(edges) = &style.edges {
+        let mut edges = None;
+        if let Some(style) = &style.edges {
             let what = (item.name.as_str(), item.revision, &*item.mesh);
-            let (edge_data, [list, numbers]) = EdgeData::update(gpu, pipelines, old, what, (world_from_mesh, edges))?;
-            data.edges = Some(edge_data);
+            let (data, [list, numbers]) = EdgeData::update(gpu, pipelines, old_edges, what, (world_from_mesh, style))?;
+            edges = Some(data);
             did = [did[0] | list, did[1] | numbers];
         }
-        Ok((data, did))
+        Ok((Self { item: data, edges }, did))
     }
 
     /// Draws with the view bound to group 0.
     pub(super) fn draw(&self, pass: &mut wgpu::RenderPass<'_>) {
-        pass.set_bind_group(1, &self.bindings, &[]);
-        pass.set_vertex_buffer(0, self.vertices.buffer.slice(..));
-        pass.draw(0..self.vertices.count, 0..1);
+        pass.set_bind_group(1, &self.item.bindings, &[]);
+        pass.set_vertex_buffer(0, self.item.elements.buffer.slice(..));
+        pass.draw(0..self.item.elements.count, 0..1);
     }
 
     /// Draws its edges with the view bound to group 0.
@@ -223,14 +188,12 @@ fn vertices(mesh: &TriMesh, shading: Shading, values: &[f32]) -> Vec<MeshVertex>
     let areas: Vec<DVec3> = faces.iter().map(|[a, b, c]| (*b - *a).cross(*c - *a)).collect();
     let mut around: HashMap<[u64; 3], Vec<usize>> = HashMap::new();
     let crease = match shading {
-        Shading::Flat | Shading::Smooth => CREASE_RAD.cos(),
+        Shading::Smooth => CREASE_RAD.cos(),
         Shading::Round => -2.0,
     };
-    if shading != Shading::Flat {
-        for (f, face) in faces.iter().enumerate() {
-            for p in face {
-                around.entry(place(*p)).or_default().push(f);
-            }
+    for (f, face) in faces.iter().enumerate() {
+        for p in face {
+            around.entry(place(*p)).or_default().push(f);
         }
     }
     let mut out = Vec::with_capacity(faces.len() * 3);
@@ -272,12 +235,9 @@ mod tests {
             // 2 of 3 (or 1 of 3) triangles at a corner belong to one side: a few degrees off the radius.
             assert!(radial(&v) > 0.995);
         }
-        for (mesh, shading) in [(tube(4), Shading::Smooth), (tube(24), Shading::Flat)] {
-            let v = vertices(&mesh, shading, &[]);
-            for t in v.chunks(3) {
-                assert_eq!(t[0].normal, t[1].normal);
-                assert_eq!(t[0].normal, t[2].normal);
-            }
+        for t in vertices(&tube(4), Shading::Smooth, &[]).chunks(3) {
+            assert_eq!(t[0].normal, t[1].normal);
+            assert_eq!(t[0].normal, t[2].normal);
         }
     }
 

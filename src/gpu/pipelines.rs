@@ -17,8 +17,8 @@ pub struct Pipelines {
     /// A picture of one sample per pixel.
     pub(super) picture_layout: wgpu::BindGroupLayout,
     /// A uniform, a picture and its sampler.
-    floor_layout: wgpu::BindGroupLayout,
-    floor_sampler: wgpu::Sampler,
+    pub(super) floor_layout: wgpu::BindGroupLayout,
+    pub(super) floor_sampler: wgpu::Sampler,
     pub(super) floor: wgpu::RenderPipeline,
     /// The shadow on the floor, and its blur in both directions.
     pub(super) shadow: wgpu::RenderPipeline,
@@ -92,31 +92,30 @@ impl Pipelines {
     /// Compiles the shaders and builds every pipeline.
     ///
     /// # Errors
-    /// [`GpuError::NoStorage`], [`GpuError::Shader`] with file and line, or [`GpuError::Device`] with the driver's reason: to
-    /// be shown in place of the view.
+    /// [`GpuError::NoStorage`], or [`GpuError::Device`] with the driver's reason: to be shown in place of the view.
     pub fn new(gpu: &Gpu) -> Result<Self, GpuError> {
         if !gpu.storage {
             return Err(GpuError::NoStorage { adapter: gpu.adapter.clone() });
         }
-        let compiled = |name| shaders::compile(gpu, name);
-        let (points, mesh, edges) = (compiled("points.wgsl")?, compiled("mesh.wgsl")?, compiled("edges.wgsl")?);
-        let (lines, floor, shadow) = (compiled("lines.wgsl")?, compiled("floor.wgsl")?, compiled("shadow.wgsl")?);
-        let edl = compiled(if gpu.samples > 1 { "edl_many.wgsl" } else { "edl_one.wgsl" })?;
+        let compiled = |label, text| shaders::compile(gpu, label, text);
+        let (points, mesh) = (compiled("points", shaders::POINTS)?, compiled("mesh", shaders::MESH)?);
+        let (lines, edges) = (compiled("lines", shaders::LINES)?, compiled("edges", shaders::EDGES)?);
+        let (floor, shadow) = (compiled("floor", shaders::FLOOR)?, compiled("shadow", shaders::SHADOW)?);
+        let edl = compiled("edl", if gpu.samples > 1 { shaders::EDL_MANY } else { shaders::EDL_ONE })?;
         gpu.guarded("building the render pipelines", || {
             let uniform = binding(0, wgpu::BufferBindingType::Uniform);
             let storage = binding(1, wgpu::BufferBindingType::Storage { read_only: true });
-            let layout = |label, entries: &[_]| {
-                gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries })
-            };
+            let layout = |label, entries: &[_]| gpu.layout(label, entries);
             let view_layout = layout("Pipelines::view_layout", &[uniform]);
             let plain_layout = layout("Pipelines::plain_layout", &[uniform]);
             let pulled_layout = layout("Pipelines::pulled_layout", &[uniform, storage]);
             let depth_layout = layout("Pipelines::depth_layout", &[depth_texture(gpu.samples > 1)]);
             let picture_layout = layout("Pipelines::picture_layout", &[depth_texture(false)]);
             let floor_layout = layout("Pipelines::floor_layout", &[uniform, filtered_texture(1), sampler(2)]);
-            let thrown = |label, item_layout: &_, vertices: &[_], vertex, fragment| {
-                let layouts = [&view_layout, item_layout];
-                build_shadow(gpu, label, layouts, &shadow, vertices, [vertex, fragment])
+            let thrown = |label, item_layout, vertices, stages| {
+                let (module, layouts) = (&shadow, &[&view_layout, item_layout][..]);
+                let (target, depth, samples) = (SHADOW_FORMAT.into(), None, 1);
+                PipelineParts { label, module, stages, layouts, vertices, target, depth, samples }.build(gpu)
             };
             let build = |variant: Variant<'_>| build(gpu, &view_layout, &variant);
             let pulled = Variant {
@@ -171,9 +170,9 @@ impl Pipelines {
                     stencil: Stencil::Unused,
                     ..pulled
                 }),
-                shadow: thrown("Shadow::pipeline", &plain_layout, &[Some(VERTEX_LAYOUT)], "vs_main", "fs_main"),
-                shadow_across: thrown("Shadow::across", &picture_layout, &[], "vs_blur", "fs_across"),
-                shadow_down: thrown("Shadow::down", &picture_layout, &[], "vs_blur", "fs_down"),
+                shadow: thrown("Shadow::pipeline", &plain_layout, &[Some(VERTEX_LAYOUT)], ["vs_main", "fs_main"]),
+                shadow_across: thrown("Shadow::across", &picture_layout, &[], ["vs_blur", "fs_across"]),
+                shadow_down: thrown("Shadow::down", &picture_layout, &[], ["vs_blur", "fs_down"]),
                 edges: build(Variant {
                     label: "Edges::pipeline",
                     module: &edges,
@@ -208,12 +207,7 @@ impl Pipelines {
                 }),
                 edl: build(Variant { ..screen }),
                 hollows: build(Variant { label: "Edl::hollows", fragment: "fs_hollows", ..screen }),
-                floor_sampler: gpu.device.create_sampler(&wgpu::SamplerDescriptor {
-                    label: Some("Floor::sampler"),
-                    mag_filter: wgpu::FilterMode::Linear,
-                    min_filter: wgpu::FilterMode::Linear,
-                    ..Default::default()
-                }),
+                floor_sampler: gpu.sampler("Floor::sampler", wgpu::FilterMode::Linear),
                 view_layout,
                 plain_layout,
                 pulled_layout,
@@ -221,46 +215,6 @@ impl Pipelines {
                 picture_layout,
                 floor_layout,
             })
-        })
-    }
-
-    /// Binds the uniform of an item, and its storage buffer if it has one.
-    pub(super) fn bind(
-        &self,
-        gpu: &Gpu,
-        label: &str,
-        uniform: &wgpu::Buffer,
-        storage: Option<&wgpu::Buffer>,
-    ) -> wgpu::BindGroup {
-        let layout = if storage.is_some() { &self.pulled_layout } else { &self.plain_layout };
-        let entries: Vec<wgpu::BindGroupEntry<'_>> = [Some(uniform), storage]
-            .into_iter()
-            .flatten()
-            .zip(0..)
-            .map(|(buffer, binding)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
-            .collect();
-        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some(label), layout, entries: &entries })
-    }
-
-    /// Binds a floor with its shadow.
-    pub(super) fn bind_floor(&self, gpu: &Gpu, uniform: &wgpu::Buffer, shadow: &wgpu::TextureView) -> wgpu::BindGroup {
-        let entries = [
-            uniform.as_entire_binding(),
-            wgpu::BindingResource::TextureView(shadow),
-            wgpu::BindingResource::Sampler(&self.floor_sampler),
-        ];
-        let entries: Vec<_> =
-            (0..).zip(entries).map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource }).collect();
-        let (label, layout) = (Some("Floor::shown"), &self.floor_layout);
-        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label, layout, entries: &entries })
-    }
-
-    /// Binds the depth of a target.
-    pub(super) fn bind_depth(&self, gpu: &Gpu, depth: &wgpu::TextureView) -> wgpu::BindGroup {
-        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("Edl::depth"),
-            layout: &self.depth_layout,
-            entries: &[wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(depth) }],
         })
     }
 }
@@ -275,73 +229,75 @@ fn binding(binding: u32, ty: wgpu::BufferBindingType) -> wgpu::BindGroupLayoutEn
     }
 }
 
-/// The depth of a target, for the fragment stage.
+/// The depth of a target, for the fragment stage. Not as depth: GL cannot load single pixels of that.
 fn depth_texture(multisampled: bool) -> wgpu::BindGroupLayoutEntry {
-    wgpu::BindGroupLayoutEntry {
-        binding: 0,
-        visibility: wgpu::ShaderStages::FRAGMENT,
-        ty: wgpu::BindingType::Texture {
-            // Not as depth: GL cannot load single pixels of that.
-            sample_type: wgpu::TextureSampleType::Float { filterable: false },
-            view_dimension: wgpu::TextureViewDimension::D2,
-            multisampled,
-        },
-        count: None,
-    }
+    texture(0, false, multisampled)
 }
 
 /// A picture that is read between its pixels, for the fragment stage.
-fn filtered_texture(binding: u32) -> wgpu::BindGroupLayoutEntry {
-    let ty = wgpu::BindingType::Texture {
-        sample_type: wgpu::TextureSampleType::Float { filterable: true },
-        view_dimension: wgpu::TextureViewDimension::D2,
-        multisampled: false,
-    };
+pub(super) fn filtered_texture(binding: u32) -> wgpu::BindGroupLayoutEntry {
+    texture(binding, true, false)
+}
+
+fn texture(binding: u32, filterable: bool, multisampled: bool) -> wgpu::BindGroupLayoutEntry {
+    let sample_type = wgpu::TextureSampleType::Float { filterable };
+    let view_dimension = wgpu::TextureViewDimension::D2;
+    let ty = wgpu::BindingType::Texture { sample_type, view_dimension, multisampled };
     wgpu::BindGroupLayoutEntry { binding, visibility: wgpu::ShaderStages::FRAGMENT, ty, count: None }
 }
 
 /// Entry of a sampler for fragments.
-fn sampler(binding: u32) -> wgpu::BindGroupLayoutEntry {
+pub(super) fn sampler(binding: u32) -> wgpu::BindGroupLayoutEntry {
     let ty = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering);
     wgpu::BindGroupLayoutEntry { binding, visibility: wgpu::ShaderStages::FRAGMENT, ty, count: None }
 }
 
-/// Builds a pipeline of the shadow: into its own small picture, without depth.
-fn build_shadow(
-    gpu: &Gpu,
-    label: &str,
-    layouts: [&wgpu::BindGroupLayout; 2],
-    module: &wgpu::ShaderModule,
-    vertices: &[Option<wgpu::VertexBufferLayout<'_>>],
-    [vertex, fragment]: [&str; 2],
-) -> wgpu::RenderPipeline {
-    let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some(label),
-        bind_group_layouts: &layouts.map(Some),
-        immediate_size: 0,
-    });
-    let compilation_options = wgpu::PipelineCompilationOptions::default();
-    gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some(label),
-        layout: Some(&layout),
-        vertex: wgpu::VertexState {
-            module,
-            entry_point: Some(vertex),
-            compilation_options: compilation_options.clone(),
-            buffers: vertices,
-        },
-        primitive: wgpu::PrimitiveState::default(),
-        depth_stencil: None,
-        multisample: wgpu::MultisampleState::default(),
-        fragment: Some(wgpu::FragmentState {
-            module,
-            entry_point: Some(fragment),
-            compilation_options,
-            targets: &[Some(SHADOW_FORMAT.into())],
-        }),
-        multiview_mask: None,
-        cache: None,
-    })
+/// What a pipeline is made of.
+pub(super) struct PipelineParts<'a> {
+    pub(super) label: &'a str,
+    pub(super) module: &'a wgpu::ShaderModule,
+    /// Entry points of the vertex and the fragment stage.
+    pub(super) stages: [&'a str; 2],
+    pub(super) layouts: &'a [&'a wgpu::BindGroupLayout],
+    pub(super) vertices: &'a [Option<wgpu::VertexBufferLayout<'a>>],
+    pub(super) target: wgpu::ColorTargetState,
+    pub(super) depth: Option<wgpu::DepthStencilState>,
+    pub(super) samples: u32,
+}
+
+impl PipelineParts<'_> {
+    pub(super) fn build(self, gpu: &Gpu) -> wgpu::RenderPipeline {
+        let (label, module) = (Some(self.label), self.module);
+        let layouts: Vec<_> = self.layouts.iter().copied().map(Some).collect();
+        let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label,
+            bind_group_layouts: &layouts,
+            immediate_size: 0,
+        });
+        let [vertex, fragment] = self.stages.map(Some);
+        let compilation_options = wgpu::PipelineCompilationOptions::default();
+        gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label,
+            layout: Some(&layout),
+            vertex: wgpu::VertexState {
+                module,
+                entry_point: vertex,
+                compilation_options: compilation_options.clone(),
+                buffers: self.vertices,
+            },
+            primitive: wgpu::PrimitiveState::default(),
+            depth_stencil: self.depth,
+            multisample: wgpu::MultisampleState { count: self.samples, ..Default::default() },
+            fragment: Some(wgpu::FragmentState {
+                module,
+                entry_point: fragment,
+                compilation_options,
+                targets: &[Some(self.target)],
+            }),
+            multiview_mask: None,
+            cache: None,
+        })
+    }
 }
 
 /// The stencil of a pipeline; the reference is 1.
@@ -359,51 +315,33 @@ fn stencil_state(stencil: Stencil) -> wgpu::StencilState {
 
 /// Builds one pipeline.
 fn build(gpu: &Gpu, view_layout: &wgpu::BindGroupLayout, variant: &Variant<'_>) -> wgpu::RenderPipeline {
-    let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some(variant.label),
-        bind_group_layouts: &[Some(view_layout), Some(variant.item_layout)],
-        immediate_size: 0,
-    });
     let compare = match variant.depth {
         Depth::Hides | Depth::Only | Depth::Tests => wgpu::CompareFunction::GreaterEqual,
         Depth::Equals => wgpu::CompareFunction::Equal,
         Depth::Ignores | Depth::Absent => wgpu::CompareFunction::Always,
     };
-    let depth_stencil = wgpu::DepthStencilState {
+    let depth = wgpu::DepthStencilState {
         format: DEPTH_FORMAT,
         depth_write_enabled: Some(matches!(variant.depth, Depth::Hides | Depth::Only)),
         depth_compare: Some(compare),
         stencil: stencil_state(variant.stencil),
         bias: wgpu::DepthBiasState::default(),
     };
-    gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some(variant.label),
-        layout: Some(&layout),
-        vertex: wgpu::VertexState {
-            module: variant.module,
-            entry_point: Some("vs_main"),
-            compilation_options: wgpu::PipelineCompilationOptions::default(),
-            buffers: variant.vertices,
-        },
-        primitive: wgpu::PrimitiveState::default(),
-        depth_stencil: (variant.depth != Depth::Absent).then_some(depth_stencil),
-        multisample: wgpu::MultisampleState { count: gpu.samples, ..Default::default() },
-        fragment: Some(wgpu::FragmentState {
-            module: variant.module,
-            entry_point: Some(variant.fragment),
-            compilation_options: wgpu::PipelineCompilationOptions::default(),
-            targets: &[Some(wgpu::ColorTargetState {
-                format: COLOR_FORMAT,
-                blend: variant.blend.then_some(OVER),
-                write_mask: match variant.depth {
-                    Depth::Only => wgpu::ColorWrites::empty(),
-                    _ => wgpu::ColorWrites::ALL,
-                },
-            })],
-        }),
-        multiview_mask: None,
-        cache: None,
-    })
+    let write_mask = match variant.depth {
+        Depth::Only => wgpu::ColorWrites::empty(),
+        _ => wgpu::ColorWrites::ALL,
+    };
+    PipelineParts {
+        label: variant.label,
+        module: variant.module,
+        stages: ["vs_main", variant.fragment],
+        layouts: &[view_layout, variant.item_layout],
+        vertices: variant.vertices,
+        target: wgpu::ColorTargetState { format: COLOR_FORMAT, blend: variant.blend.then_some(OVER), write_mask },
+        depth: (variant.depth != Depth::Absent).then_some(depth),
+        samples: gpu.samples,
+    }
+    .build(gpu)
 }
 
 /// Blends colors by alpha; the picture itself stays as opaque as its ground.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, DVec3};
 
-use super::buffer::{Elements, Uniform};
+use super::buffer::Item;
 use super::pipelines::Pipelines;
 use super::vertex::drawable;
 use super::{Gpu, GpuError, view, wgpu};
@@ -106,19 +106,13 @@ pub(super) struct PointsUniform {
     pub(super) stride: u32,
     pub(super) drawn: u32,
     pub(super) selected: u32,
-    pub(super) unused_0: u32,
-    pub(super) unused_1: u32,
-    pub(super) unused_2: u32,
 }
 
 /// A cloud on the device.
 #[derive(Debug)]
 pub(super) struct PointsData {
-    /// Revision, color mode and number of points of what is in the buffer.
-    uploaded: (u64, u32, usize),
-    points: Elements,
-    uniform: Uniform<PointsUniform>,
-    bindings: wgpu::BindGroup,
+    /// By revision, color mode and number of points.
+    item: Item<(u64, u32, usize), PointsUniform>,
     instances: u32,
 }
 
@@ -135,30 +129,21 @@ impl PointsData {
         stride: u32,
     ) -> Result<(Self, [bool; 2]), GpuError> {
         let wanted = (item.revision, color_mode(&item.colors), item.points.len());
-        let (mut data, uploaded) = match old {
-            Some(data) if data.uploaded == wanted => (data, false),
-            old => {
-                let label = format!("Points::{}", item.name);
-                let (buffer, uniform) = old.map_or((None, None), |d| (Some(d.points.buffer), Some(d.uniform)));
-                let usage = wgpu::BufferUsages::STORAGE;
-                let points = Elements::upload(gpu, &label, &vertices(item), usage, buffer)?;
-                let uniform = uniform.unwrap_or_else(|| Uniform::new(gpu, &label));
-                let bindings = pipelines.bind(gpu, &label, &uniform.buffer, Some(&points.buffer));
-                (Self { uploaded: wanted, points, uniform, bindings, instances: 0 }, true)
-            }
-        };
-        let count = data.points.count;
+        let (on, label) = ((gpu, pipelines), ["Points", &item.name]);
+        let (old, usage) = (old.map(|data| data.item), wgpu::BufferUsages::STORAGE);
+        let (mut data, uploaded) = Item::upload(on, label, old, wanted, usage, || vertices(item))?;
+        let count = data.elements.count;
         let stride = stride.max(1);
         let drawn = count.div_ceil(stride);
         let selected = item.style.selected.and_then(|i| u32::try_from(i).ok()).filter(|i| *i < count);
-        data.instances = drawn + u32::from(selected.is_some());
+        let instances = drawn + u32::from(selected.is_some());
         let written = data.uniform.set(gpu, uniform(&item.style, wanted.1, stride, drawn, selected));
-        Ok((data, [uploaded, written]))
+        Ok((Self { item: data, instances }, [uploaded, written]))
     }
 
     /// Draws with the view bound to group 0.
     pub(super) fn draw(&self, pass: &mut wgpu::RenderPass<'_>) {
-        pass.set_bind_group(1, &self.bindings, &[]);
+        pass.set_bind_group(1, &self.item.bindings, &[]);
         pass.draw(0..6, 0..self.instances);
     }
 }
@@ -209,8 +194,5 @@ fn uniform(style: &CloudStyle, color_mode: u32, stride: u32, drawn: u32, selecte
         stride,
         drawn,
         selected: selected.unwrap_or(u32::MAX),
-        unused_0: 0,
-        unused_1: 0,
-        unused_2: 0,
     }
 }

@@ -8,6 +8,8 @@ use std::ops::Range;
 use bytemuck::{Pod, Zeroable};
 
 use super::buffer::Elements;
+use super::context::begin_color;
+use super::pipelines::{PipelineParts, filtered_texture, sampler};
 use super::{Gpu, GpuError, shaders, wgpu};
 
 /// A corner of a triangle.
@@ -92,79 +94,29 @@ impl Raster {
     /// For pictures and a window of `format`.
     ///
     /// # Errors
-    /// [`GpuError::Shader`] and [`GpuError::Device`].
+    /// [`GpuError::Device`].
     pub fn new(gpu: &Gpu, format: wgpu::TextureFormat) -> Result<Self, GpuError> {
-        let module = shaders::compile(gpu, "raster.wgsl")?;
+        let module = shaders::compile(gpu, "raster", shaders::RASTER)?;
         gpu.guarded("building the pipelines of the window", || {
-            let device = &gpu.device;
-            let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-                label: Some("Raster::layout"),
-                entries: &[
-                    wgpu::BindGroupLayoutEntry {
-                        binding: 0,
-                        visibility: wgpu::ShaderStages::FRAGMENT,
-                        ty: wgpu::BindingType::Texture {
-                            multisampled: false,
-                            sample_type: wgpu::TextureSampleType::Float { filterable: true },
-                            view_dimension: wgpu::TextureViewDimension::D2,
-                        },
-                        count: None,
-                    },
-                    wgpu::BindGroupLayoutEntry {
-                        binding: 1,
-                        visibility: wgpu::ShaderStages::FRAGMENT,
-                        ty: wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering),
-                        count: None,
-                    },
-                ],
-            });
-            let build = |label, [vertex, fragment]: [&str; 2], bound: bool, blend| {
-                let groups = [Some(&layout)];
-                let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-                    label: Some(label),
-                    bind_group_layouts: if bound { &groups } else { &[] },
-                    immediate_size: 0,
-                });
-                let corners = [Some(wgpu::VertexBufferLayout {
-                    array_stride: size_of::<Corner>() as u64,
-                    step_mode: wgpu::VertexStepMode::Vertex,
-                    attributes: &wgpu::vertex_attr_array![0 => Float32x2, 1 => Float32x2, 2 => Unorm8x4],
-                })];
-                device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-                    label: Some(label),
-                    layout: Some(&pipeline_layout),
-                    vertex: wgpu::VertexState {
-                        module: &module,
-                        entry_point: Some(vertex),
-                        compilation_options: wgpu::PipelineCompilationOptions::default(),
-                        buffers: if vertex == "vs_main" { &corners } else { &[] },
-                    },
-                    primitive: wgpu::PrimitiveState::default(),
-                    depth_stencil: None,
-                    multisample: wgpu::MultisampleState::default(),
-                    fragment: Some(wgpu::FragmentState {
-                        module: &module,
-                        entry_point: Some(fragment),
-                        compilation_options: wgpu::PipelineCompilationOptions::default(),
-                        targets: &[Some(wgpu::ColorTargetState { format, blend, write_mask: wgpu::ColorWrites::ALL })],
-                    }),
-                    multiview_mask: None,
-                    cache: None,
-                })
-            };
-            let sampler = |filter| {
-                device.create_sampler(&wgpu::SamplerDescriptor {
-                    label: Some("Raster::sampler"),
-                    mag_filter: filter,
-                    min_filter: filter,
-                    ..Default::default()
-                })
+            let layout = gpu.layout("Raster::layout", &[filtered_texture(0), sampler(1)]);
+            let corners = [Some(wgpu::VertexBufferLayout {
+                array_stride: size_of::<Corner>() as u64,
+                step_mode: wgpu::VertexStepMode::Vertex,
+                attributes: &wgpu::vertex_attr_array![0 => Float32x2, 1 => Float32x2, 2 => Unorm8x4],
+            })];
+            let build = |label, stages: [&str; 2], bound: bool, blend| {
+                let (layouts, vertices) =
+                    (&[&layout][..usize::from(bound)], &corners[..usize::from(stages[0] == "vs_main")]);
+                let target = wgpu::ColorTargetState { format, blend, write_mask: wgpu::ColorWrites::ALL };
+                let (module, depth, samples) = (&module, None, 1);
+                PipelineParts { label, module, stages, layouts, vertices, target, depth, samples }.build(gpu)
             };
             Ok(Self {
                 flat: build("Raster::flat", ["vs_main", "fs_flat"], false, Some(OVER)),
                 textured: build("Raster::textured", ["vs_main", "fs_tinted"], true, Some(OVER)),
                 whole: build("Raster::whole", ["vs_whole", "fs_copied"], true, None),
-                samplers: [wgpu::FilterMode::Linear, wgpu::FilterMode::Nearest].map(sampler),
+                samplers: [wgpu::FilterMode::Linear, wgpu::FilterMode::Nearest]
+                    .map(|filter| gpu.sampler("Raster::sampler", filter)),
                 layout,
                 textures: BTreeMap::new(),
                 corners: None,
@@ -186,17 +138,8 @@ impl Raster {
     }
 
     fn bind(&self, gpu: &Gpu, view: &wgpu::TextureView, nearest: bool) -> wgpu::BindGroup {
-        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("Raster::texture"),
-            layout: &self.layout,
-            entries: &[
-                wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(view) },
-                wgpu::BindGroupEntry {
-                    binding: 1,
-                    resource: wgpu::BindingResource::Sampler(&self.samplers[usize::from(nearest)]),
-                },
-            ],
-        })
+        let sampler = wgpu::BindingResource::Sampler(&self.samplers[usize::from(nearest)]);
+        gpu.bind("Raster::texture", &self.layout, &[wgpu::BindingResource::TextureView(view), sampler])
     }
 
     /// An empty picture of `size` pixels and `format`, which must be that of the raster.
@@ -256,16 +199,8 @@ impl Raster {
             let label = Some("Raster::encoder");
             let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label });
             {
-                let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                    label: Some("Raster::pass"),
-                    color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                        view: &picture.view,
-                        depth_slice: None,
-                        resolve_target: None,
-                        ops: wgpu::Operations { load: wgpu::LoadOp::Load, store: wgpu::StoreOp::Store },
-                    })],
-                    ..Default::default()
-                });
+                let load = wgpu::LoadOp::Load;
+                let mut pass = begin_color(&mut encoder, "Raster::pass", &picture.view, load);
                 pass.set_vertex_buffer(0, corners.buffer.slice(..));
                 pass.set_index_buffer(indices.buffer.slice(..), wgpu::IndexFormat::Uint32);
                 for run in runs {
@@ -289,23 +224,15 @@ impl Raster {
     }
 }
 
+/// A texture of at least one pixel.
 fn texture(
     gpu: &Gpu,
     label: &str,
-    [width, height]: [u32; 2],
+    size: [u32; 2],
     format: wgpu::TextureFormat,
     usage: wgpu::TextureUsages,
 ) -> wgpu::Texture {
-    gpu.device.create_texture(&wgpu::TextureDescriptor {
-        label: Some(label),
-        size: wgpu::Extent3d { width: width.max(1), height: height.max(1), depth_or_array_layers: 1 },
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format,
-        usage,
-        view_formats: &[],
-    })
+    gpu.texture(label, size.map(|s| s.max(1)), format, 1, usage)
 }
 
 fn write(gpu: &Gpu, texture: &wgpu::Texture, [x, y]: [u32; 2], [width, height]: [u32; 2], rgba: &[u8]) {

@@ -148,12 +148,9 @@ impl SceneRenderer {
     /// [`GpuError::Device`].
     pub fn new(gpu: &Gpu, pipelines: Arc<Pipelines>) -> Result<Self, GpuError> {
         gpu.guarded("preparing a 3D view", || {
-            let view = Uniform::new(gpu, "Scene::view");
-            let view_bindings = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: Some("Scene::view"),
-                layout: &pipelines.view_layout,
-                entries: &[wgpu::BindGroupEntry { binding: 0, resource: view.buffer.as_entire_binding() }],
-            });
+            let view: Uniform<ViewUniform> = Uniform::new(gpu, "Scene::view");
+            let buffer = view.buffer.as_entire_binding();
+            let view_bindings = gpu.bind("Scene::view", &pipelines.view_layout, &[buffer]);
             Ok(Self {
                 moving_points: if gpu.software { 20_000 } else { 1_000_000 },
                 pipelines,
@@ -201,7 +198,9 @@ impl SceneRenderer {
         let result = gpu.guarded("drawing a 3D view", || {
             let changed = self.update(gpu, scene, camera, part)?;
             if scene.eye_dome && self.depth.as_ref().is_none_or(|(of, _)| *of != target.generation()) {
-                self.depth = Some((target.generation(), self.pipelines.bind_depth(gpu, target.depth_alone())));
+                let depth = [wgpu::BindingResource::TextureView(target.depth_alone())];
+                let depth = gpu.bind("Edl::depth", &self.pipelines.depth_layout, &depth);
+                self.depth = Some((target.generation(), depth));
             }
             let shown = Shown {
                 target: target.generation(),

@@ -27,18 +27,7 @@ impl Target {
         static GENERATION: AtomicU64 = AtomicU64::new(0);
         let size = Self::possible(gpu, size);
         gpu.guarded("creating the off-screen picture", || {
-            let texture = |label, format, samples, usage| {
-                gpu.device.create_texture(&wgpu::TextureDescriptor {
-                    label: Some(label),
-                    size: extent(size),
-                    mip_level_count: 1,
-                    sample_count: samples,
-                    dimension: wgpu::TextureDimension::D2,
-                    format,
-                    usage,
-                    view_formats: &[],
-                })
-            };
+            let texture = |label, format, samples, usage| gpu.texture(label, size, format, samples, usage);
             let attachment = wgpu::TextureUsages::RENDER_ATTACHMENT;
             let shown = attachment | wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC;
             let view = |t: wgpu::Texture| t.create_view(&wgpu::TextureViewDescriptor::default());

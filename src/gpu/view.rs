@@ -304,7 +304,7 @@ impl Camera {
     }
 
     /// The unit vector towards the key light, world: above the eye, to its left.
-    pub(crate) fn key_light(&self) -> DVec3 {
+    pub(super) fn key_light(&self) -> DVec3 {
         let [right, up, back] = self.axes();
         (back + 0.55 * up - 0.45 * right).normalize()
     }
@@ -337,9 +337,6 @@ impl Camera {
             px_per_m: (self.px_per_m(size) * at_one) as f32,
             plane_count: cut.len().min(MAX_PLANES) as u32,
             unit_px: if unit_px.is_finite() { unit_px.max(0.01) } else { 1.0 },
-            unused_0: 0.0,
-            unused_1: 0.0,
-            unused_2: 0.0,
             planes: std::array::from_fn(|i| {
                 cut.get(i).map_or([0.0; 4], |plane| plane.normal.extend(plane.offset_m).as_vec4().to_array())
             }),
@@ -393,14 +390,11 @@ pub(super) struct ViewUniform {
     pub(super) up_in_world: [f32; 4],
     pub(super) key_in_world: [f32; 4],
     pub(super) depth: [f32; 4],
+    pub(super) planes: [[f32; 4]; MAX_PLANES],
     pub(super) size_px: [f32; 2],
     pub(super) px_per_m: f32,
     pub(super) plane_count: u32,
     pub(super) unit_px: f32,
-    pub(super) unused_0: f32,
-    pub(super) unused_1: f32,
-    pub(super) unused_2: f32,
-    pub(super) planes: [[f32; 4]; MAX_PLANES],
 }
 
 /// A position for the device; one that is not finite (or not in reach of f32) becomes one that shaders leave out.

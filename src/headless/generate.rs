@@ -151,7 +151,7 @@ fn score_color(difference: &RgbGrid, touch: &PadTouch, figures: &mut Figures) ->
         let [w, h] = measured.difference.size();
         let sized = resample::bilinear_rgb(difference, w, h);
         let (psnr, ssim) = metrics::color(&sized, &measured.difference)?;
-        (figures.psnr_db, figures.ssim) = (psnr.db(), Some(ssim));
+        (figures.psnr_db, figures.ssim) = (psnr, Some(ssim));
     }
     Ok(())
 }

@@ -5,7 +5,6 @@ mod timing;
 
 use std::path::PathBuf;
 
-use anyhow::Context as _;
 use clap::Args;
 use serde::Serialize;
 use strum::IntoEnumIterator as _;
@@ -16,7 +15,7 @@ use self::timing::{First, Overhead};
 use super::Machine;
 use super::figures::quantile;
 use super::front::{self, FrontPoint};
-use crate::json::JsonArgs;
+use crate::json::{JsonArgs, write};
 use touch2touch::headless::{Output, VerbResult};
 use touch2touch_core::diffusion::{GenerateConfig, Sampler, Spacing};
 use touch2touch_core::metrics::AngleSummary;
@@ -25,7 +24,6 @@ use touch2touch_core::rig::Rig;
 use touch2touch_pipeline::infer::engine::{EngineChoice, EngineKind, resolve};
 use touch2touch_pipeline::infer::generator::Generator;
 use touch2touch_pipeline::infer::mask::MaskModel;
-use touch2touch_pipeline::io::atomic;
 use touch2touch_pipeline::steps::bundles::{self, BundleKind};
 
 /// Sampler and steps that everything is measured against.
@@ -110,11 +108,7 @@ struct Row {
 #[derive(Debug, Serialize)]
 struct Knee {
     engine: EngineKind,
-    /// By root mean square error alone: within 2 % of the reference in at most a tenth of its time.
-    by_rmse: Option<String>,
-    /// By the mean angle error alone, likewise.
-    by_angle: Option<String>,
-    /// For both at once.
+    /// By root mean square error and mean angle error: within 2 % of the reference in at most a tenth of its time.
     both: Option<String>,
 }
 
@@ -292,22 +286,15 @@ fn knee(engine: EngineKind, rows: &[Row]) -> Knee {
     let mut own: Vec<&Row> = rows.iter().filter(|row| row.engine == engine).collect();
     let reference = own.iter().find(|row| (row.sampler, row.steps) == REFERENCE).copied();
     own.sort_by(|a, b| a.median_ms.total_cmp(&b.median_ms));
-    let fastest = |good: &dyn Fn(&Row, &Row) -> bool| {
-        let reference = reference?;
-        let fast = |row: &Row| row.share_of_reference.is_some_and(|share| share <= SHARE);
-        own.iter().find(|row| fast(row) && good(row, reference)).map(|row| row.name.clone())
-    };
     let rmse = |row: &Row, reference: &Row| row.rmse_mm <= WORSE * reference.rmse_mm;
     let angle = |row: &Row, reference: &Row| {
         let pair = row.angles.mean_deg.zip(reference.angles.mean_deg);
         row.no_pose <= reference.no_pose && pair.is_some_and(|(row, reference)| row <= WORSE * reference)
     };
-    Knee {
-        engine,
-        by_rmse: fastest(&rmse),
-        by_angle: fastest(&angle),
-        both: fastest(&|row, reference| rmse(row, reference) && angle(row, reference)),
-    }
+    let fast = |row: &Row| row.share_of_reference.is_some_and(|share| share <= SHARE);
+    let knee = reference
+        .and_then(|reference| own.iter().find(|row| fast(row) && rmse(row, reference) && angle(row, reference)));
+    Knee { engine, both: knee.map(|row| row.name.clone()) }
 }
 
 fn points(rows: &[Row], error: impl Fn(&Row) -> Option<(f64, f64)>) -> Vec<FrontPoint> {
@@ -324,11 +311,6 @@ fn points(rows: &[Row], error: impl Fn(&Row) -> Option<(f64, f64)>) -> Vec<Front
         })
     };
     front::pareto(rows.iter().filter(|row| Some(row.engine) == first).filter_map(point).collect())
-}
-
-fn write(file: &std::path::Path, report: &Report) -> anyhow::Result<()> {
-    atomic::write_bytes(file, serde_json::to_string_pretty(report)?.as_bytes())
-        .with_context(|| format!("cannot write {}", file.display()))
 }
 
 fn text(report: &Report) -> String {
@@ -375,39 +357,18 @@ fn text(report: &Report) -> String {
         );
     }
     text += "\nknee: within 2 % of the reference in at most a tenth of its time\n";
-    let name = |name: &Option<String>| name.clone().unwrap_or_else(|| "none".into());
     for knee in &report.knees {
-        text += &format!(
-            "{}: by rmse {}, by angle {}, by both {}\n",
-            knee.engine.label(),
-            name(&knee.by_rmse),
-            name(&knee.by_angle),
-            name(&knee.both)
-        );
+        text += &format!("{}: {}\n", knee.engine.label(), knee.both.as_deref().unwrap_or("none"));
     }
     for o in &report.overhead {
         text += &format!(
-            "{}: overhead of the sampler over the bare graphs {:.2} % (median of {} pairs of runs; shortest runs {:.2} %; \
-             medians {:.1} against {:.1} ms)\n",
+            "{}: overhead of the sampler over the bare graphs {:.2} % of the shortest runs\n",
             o.engine.label(),
-            o.percent,
-            o.pairs,
-            o.percent_of_shortest,
-            o.generator_ms,
-            o.bare_ms
+            o.percent_of_shortest
         );
     }
     for f in &report.first {
-        text += &format!(
-            "{}: loading {:.0} ms, first result cold {:.0} ms, warm {:.0} ms, first preview {} ms, previews of one finger \
-             cost {} %\n",
-            f.engine.label(),
-            f.load_ms,
-            f.cold_ms,
-            f.warm_ms,
-            number(f.preview_ms, 0),
-            number(f.preview_percent, 1)
-        );
+        text += &format!("{}: first result cold {:.0} ms, warm {:.0} ms\n", f.engine.label(), f.cold_ms, f.warm_ms);
     }
     text
 }

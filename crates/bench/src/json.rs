@@ -29,8 +29,12 @@ impl JsonArgs {
 
     /// Writes the file, where one is named.
     pub(crate) fn write(&self, report: &impl Serialize) -> anyhow::Result<()> {
-        let Some(file) = self.file() else { return Ok(()) };
-        atomic::write_bytes(file, serde_json::to_string_pretty(report)?.as_bytes())
-            .map_err(|err| anyhow::anyhow!("cannot write {}: {err}", file.display()))
+        self.file().map_or(Ok(()), |file| write(file, report))
     }
+}
+
+/// Writes a file.
+pub(crate) fn write(file: &Path, report: &impl Serialize) -> anyhow::Result<()> {
+    atomic::write_bytes(file, serde_json::to_string_pretty(report)?.as_bytes())
+        .map_err(|err| anyhow::anyhow!("cannot write {}: {err}", file.display()))
 }

@@ -132,11 +132,6 @@ fn engine_row(row: Row, cases: &[Prepared], chosen: &[usize]) -> anyhow::Result<
             error_deg: error,
             position_mm: position_error_mm(pose, case.truth),
             ms: number(answer.ms),
-            best_ms: number(answer.ms),
-            first_ms: number(answer.ms),
-            lookups: 0.0,
-            flagged: None,
-            rung: None,
         });
     }
     let cpu: Vec<f64> = row.poses.iter().filter_map(|p| p.cpu_ms).collect();

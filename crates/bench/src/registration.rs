@@ -15,7 +15,7 @@ use super::front::{self, FrontPoint};
 use super::reliability::{Reliability, scores};
 use super::rows::{EngineRow, Prepared, offset, position_error_mm};
 use super::{Machine, contact_points, peers};
-use crate::json::JsonArgs;
+use crate::json::{JsonArgs, write};
 use touch2touch::headless::says;
 use touch2touch::headless::{LimitArgs, ModelArgs, at_least_one};
 use touch2touch::headless::{Output, VerbResult};
@@ -29,7 +29,6 @@ use touch2touch_core::pose::{Registration, ToolModel, register, register_with};
 use touch2touch_core::rig::Rig;
 use touch2touch_core::units::angle_error;
 use touch2touch_pipeline::infer::engine::EngineChoice;
-use touch2touch_pipeline::io::atomic;
 use touch2touch_pipeline::pairs;
 use touch2touch_pipeline::steps::mask::MaskSource;
 
@@ -183,9 +182,7 @@ struct Report {
 
 /// Times of one repeated call, milliseconds.
 struct Timed<T> {
-    first: f64,
     median: f64,
-    best: f64,
     calls: usize,
     value: T,
 }
@@ -212,7 +209,7 @@ fn timed<T>(mut f: impl FnMut() -> T) -> Timed<T> {
         all.push(ms);
     }
     let median = quantile(all.iter().copied(), 0.5).unwrap_or(first);
-    Timed { first, median, best: all.iter().copied().fold(f64::INFINITY, f64::min), calls: all.len(), value }
+    Timed { median, calls: all.len(), value }
 }
 
 pub(super) fn run(args: &RegistrationArgs) -> VerbResult {
@@ -450,17 +447,7 @@ fn outcome(case: &Prepared, timed: Timed<Result<AlignReport, AlignError>>) -> Ou
         error_deg: pose.map_or(f64::NAN, |p| angle_error(p.theta_rad, case.truth.theta_rad).to_degrees()),
         position_mm: pose.map_or(f64::NAN, |p| position_error_mm(p, case.truth)),
         ms: timed.median,
-        best_ms: timed.best,
-        first_ms: timed.first,
-        lookups: report.map_or(0.0, |r| r.lookups as f64),
-        flagged: report.and_then(|r| Some(r.observability?.degenerate)),
-        rung: report.filter(|r| !r.ladder.is_empty()).map(|r| r.rung.to_string()),
     }
-}
-
-fn write(file: &Path, report: &Report) -> anyhow::Result<()> {
-    atomic::write_bytes(file, serde_json::to_string_pretty(report)?.as_bytes())
-        .with_context(|| format!("cannot write {}", file.display()))
 }
 
 fn text(report: &Report) -> String {
@@ -476,23 +463,13 @@ fn text(report: &Report) -> String {
     );
     let width = report.engines.iter().map(|e| e.name.len()).max().unwrap_or(6).max(6);
     text += &format!(
-        "{:width$} {:>4} {:>10} {:>10} {:>7} {:>8} {:>7} {:>7} {:>7} {:>7} {:>9}\n",
-        "engine",
-        "n",
-        "median ms",
-        "p95 ms",
-        "mean °",
-        "median °",
-        "<=5° %",
-        "<=10° %",
-        ">20° %",
-        "pos. mm",
-        "look-ups"
+        "{:width$} {:>4} {:>10} {:>10} {:>7} {:>8} {:>7} {:>7} {:>7} {:>7}\n",
+        "engine", "n", "median ms", "p95 ms", "mean °", "median °", "<=5° %", "<=10° %", ">20° %", "pos. mm"
     );
     for row in &report.engines {
         let f = &row.summary.all;
         text += &format!(
-            "{:width$} {:>4} {:>10} {:>10} {:>9} {:>7} {:>8} {:>7.1} {:>7.1} {:>7.1} {:>7} {:>9}{}\n",
+            "{:width$} {:>4} {:>10} {:>10} {:>9} {:>7} {:>8} {:>7.1} {:>7.1} {:>7.1} {:>7}{}\n",
             row.name,
             f.angles.count,
             number(f.median_ms, 3),
@@ -504,7 +481,6 @@ fn text(report: &Report) -> String {
             f.angles.success_10,
             f.gross_20,
             number(f.position_median_mm, 2),
-            number(f.lookups_median, 0),
             if row.name == report.default { "  <- default" } else { "" },
         );
     }
@@ -519,10 +495,7 @@ fn text(report: &Report) -> String {
                 format!("{name} {mean} {:.1} {:.1}", f.angles.success_5, f.angles.success_10)
             })
             .collect();
-        let flags = if row.peer { String::new() } else { format!(" | {}", row.summary.all.flags_text()) };
-        let rungs = &row.summary.all.rungs;
-        let rungs = if rungs.is_empty() { String::new() } else { format!(" | rungs {rungs:?}") };
-        text += &format!("{:width$} {}{flags}{rungs}\n", row.name, strata.join(" | "));
+        text += &format!("{:width$} {}\n", row.name, strata.join(" | "));
     }
     text += "\nerrors in standard deviations, rms (within two): 1 (95 %) where these are right\n";
     for row in &report.engines {

@@ -24,7 +24,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::json::JsonArgs;
-use count::{After, Loop, Share, Tried, with_verdict};
+use count::{Loop, Share, Tried, with_verdict};
 use hole::Hole;
 use insertion::passes;
 use outline::Outline;
@@ -38,7 +38,7 @@ use touch2touch_core::pose::ToolModel;
 use touch2touch_core::rig::Rig;
 use touch2touch_core::sample::Sample;
 use touch2touch_core::sim::{Sensors, random_grasp, simulate};
-use touch2touch_core::units::{angle_error, fixed, mm};
+use touch2touch_core::units::{angle_error, fixed};
 use touch2touch_core::verdict::Verdict;
 use touch2touch_pipeline::io::dataset::Dataset;
 use touch2touch_pipeline::job::JobCx;
@@ -54,8 +54,6 @@ const TRIAL_SEED: u64 = 0x7e1a_1000_0000_0000 + 1_000_003;
 const GIVE_RAD: f64 = 2.0 / 180.0 * std::f64::consts::PI;
 /// Room to each side of the upright tool in its hole, meters.
 const ROOM_M: f64 = 0.001;
-/// Rooms that the same poses are tried with besides, meters.
-const ROOMS_M: [f64; 3] = [0.0005, 0.002, 0.005];
 
 /// Arguments of `bench trials`.
 #[derive(Debug, Args)]
@@ -90,8 +88,8 @@ struct Method {
 
 /// Goal of a trial.
 enum Goal {
-    /// A hole of the tool's own outline, and those with the other rooms.
-    Insertion { outline: Outline, hole: Hole, wider: Vec<(f64, Hole)> },
+    /// A hole of the tool's own outline.
+    Insertion { outline: Outline, hole: Hole },
     /// A cup on a cup.
     Stacking,
 }
@@ -102,14 +100,12 @@ impl Goal {
             return Ok(Self::Stacking);
         }
         let outline = Outline::of_mesh(&spec.mesh()).with_context(|| spec.name.clone())?;
-        let hole = |room_m: f64| Hole::new(&outline, room_m);
-        let wider = ROOMS_M.map(|room_m| Ok((room_m, hole(room_m)?))).into_iter().collect::<anyhow::Result<_>>()?;
-        Ok(Self::Insertion { hole: hole(ROOM_M)?, wider, outline })
+        Ok(Self::Insertion { hole: Hole::new(&outline, ROOM_M)?, outline })
     }
 
     fn succeeds(&self, grasp: InHand) -> bool {
         match self {
-            Self::Insertion { outline, hole, .. } => passes(outline, hole, grasp),
+            Self::Insertion { outline, hole } => passes(outline, hole, grasp),
             Self::Stacking => stands(grasp),
         }
     }
@@ -117,16 +113,8 @@ impl Goal {
 
 /// A grasp as a method holds it.
 struct Held {
-    grasp: Option<InHand>,
     error_rad: f64,
     tried: Tried,
-}
-
-/// Success with another room.
-#[derive(Serialize)]
-struct Swept {
-    clearance_m: f64,
-    success: Share,
 }
 
 /// The trials of a tool by one method.
@@ -135,8 +123,6 @@ struct MethodTrials {
     method: String,
     /// Successes where the first grasp is tried, whatever the verdict, as in the paper.
     success: Share,
-    /// The same with other rooms; empty for a cup.
-    sweep: Vec<Swept>,
     /// Counts with the verdict in the loop; empty where no pose is estimated.
     with_verdict: Vec<Loop>,
     /// Angle errors of the first grasps.
@@ -219,7 +205,7 @@ pub(super) fn run(args: &TrialsArgs) -> VerbResult {
         for trial in made {
             by_method.iter_mut().zip(trial).for_each(|(of, one)| of.push(one));
         }
-        let rows = methods.iter().zip(by_method).map(|(method, trials)| counted(method, &goal, &trials));
+        let rows = methods.iter().zip(by_method).map(|(method, trials)| counted(method, &trials));
         found.push(ToolTrials { tool: spec.name.clone(), methods: rows.collect() });
     }
     let report = Report { sensors, tools: found, published: published() };
@@ -262,7 +248,7 @@ impl Hand<'_> {
             let grasp = grasp(straight);
             let tried = Tried { grade: None, success: self.goal.succeeds(grasp) };
             let error_rad = angle_error(straight.theta_rad, truth.theta_rad);
-            return Ok(Held { grasp: Some(grasp), error_rad, tried });
+            return Ok(Held { error_rad, tried });
         };
         let labels = PairLabels::default();
         let touch = Touch { dataset: self.dataset, pair: PairId(0), sample, tool: Ok(self.model), labels: &labels };
@@ -273,32 +259,21 @@ impl Hand<'_> {
                 // Where a tool is along its own axis is no fault: it is let down along it until it meets something.
                 let grade = Verdict::let_down(&found.report).map(|verdict| verdict.grade);
                 let tried = Tried { grade, success: self.goal.succeeds(grasp) };
-                Held { grasp: Some(grasp), error_rad: found.error_rad.unwrap_or(f64::NAN), tried }
+                Held { error_rad: found.error_rad.unwrap_or(f64::NAN), tried }
             }
-            Err(_) => Held { grasp: None, error_rad: f64::NAN, tried: Tried { grade: None, success: false } },
+            Err(_) => Held { error_rad: f64::NAN, tried: Tried { grade: None, success: false } },
         })
     }
 }
 
 /// The counts of a method.
-fn counted(method: &Method, goal: &Goal, trials: &[(Held, Option<Tried>)]) -> MethodTrials {
+fn counted(method: &Method, trials: &[(Held, Option<Tried>)]) -> MethodTrials {
     let firsts = || trials.iter().map(|(held, _)| held);
-    let sweep = match goal {
-        Goal::Insertion { outline, wider, .. } => {
-            let with = |(clearance_m, hole): &(f64, Hole)| {
-                let success = firsts().map(|held| held.grasp.is_some_and(|grasp| passes(outline, hole, grasp)));
-                Swept { clearance_m: *clearance_m, success: Share::count(success) }
-            };
-            wider.iter().map(with).collect()
-        }
-        Goal::Stacking => Vec::new(),
-    };
-    let looped = |after| with_verdict(trials.iter().map(|(held, again)| (held.tried, *again)), after);
+    let looped = || with_verdict(trials.iter().map(|(held, again)| (held.tried, *again)));
     MethodTrials {
         method: method.name.clone(),
         success: Share::count(firsts().map(|held| held.tried.success)),
-        sweep,
-        with_verdict: method.recipe.iter().flat_map(|_| [After::Try, After::GiveUp].map(looped)).collect(),
+        with_verdict: method.recipe.iter().map(|_| looped()).collect(),
         angle: AngleSummary::from_errors(&firsts().map(|held| held.error_rad).collect::<Vec<_>>()),
     }
 }
@@ -307,15 +282,10 @@ fn table(tool: &ToolTrials) -> String {
     let mut text = format!("{}\n", tool.tool);
     for method in &tool.methods {
         let angle = method.angle.mean_deg.map_or("-".to_owned(), |deg| fixed(deg, 1));
-        text += &format!("  {:<34} {angle:>5}°  {}", method.method, method.success);
-        for Swept { clearance_m, success } in &method.sweep {
-            text += &format!(", {} with {} mm", success.hits, fixed(mm(*clearance_m), 1));
-        }
-        text += "\n";
-        for Loop { after, regrasps, refusals, per_trial, per_try } in &method.with_verdict {
-            let after = if *after == After::Try { "then try" } else { "then give up" };
+        text += &format!("  {:<34} {angle:>5}°  {}\n", method.method, method.success);
+        for Loop { regrasps, refusals, per_trial, per_try, .. } in &method.with_verdict {
             text += &format!(
-                "    verdict, {after}: {per_trial} of trials, {per_try} of tries; {regrasps} grasped again, {refusals} refused\n"
+                "    verdict: {per_trial} of trials, {per_try} of tries; {regrasps} grasped again, {refusals} refused\n"
             );
         }
     }

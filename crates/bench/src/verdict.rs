@@ -1,5 +1,4 @@
-//! `touch2touch-bench verdict`: the verdict without the truth, and each of its signs alone, as detectors of faults that are drawn
-//! into known grasps.
+//! `touch2touch-bench verdict`: the verdict without the truth as a detector of faults that are drawn into known grasps.
 
 use std::path::PathBuf;
 
@@ -12,13 +11,11 @@ use serde::Serialize;
 use strum::IntoEnumIterator as _;
 
 use super::Machine;
-use super::figures::quantile;
 use super::registration::{Masks, images, masks, points};
-use super::rows::position_error_mm;
 use crate::json::JsonArgs;
 use touch2touch::headless::{ModelArgs, Output, VerbResult};
 use touch2touch_bench::known::{Case, CaseSet, Suite};
-use touch2touch_core::align::{Ask, Contacts, Evidence};
+use touch2touch_core::align::{AlignReport, Ask, Contacts};
 use touch2touch_core::catalog::ToolSpec;
 use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::pose::{Registration, ToolModel, register_with};
@@ -168,53 +165,11 @@ impl Trial {
 }
 
 /// A registered trial.
-#[derive(Clone, Debug, Serialize)]
 struct Row {
-    case: usize,
     fault: Fault,
-    stratum: String,
-    tool: usize,
     /// Error of the angle, degrees; none without a pose.
     error_deg: Option<f64>,
-    position_mm: Option<f64>,
-    /// Pose minus truth: radians, meters, meters.
-    off: Option<[f64; 3]>,
-    /// Share of the used points within the narrowest kernel; none without a pose, as what follows.
-    inlier_share: Option<f64>,
-    evidence: Option<Evidence>,
     verdict: Option<Verdict>,
-    /// Reason why there is no pose.
-    why: Option<String>,
-}
-
-/// Sign of a fault.
-struct Sign {
-    name: &'static str,
-    /// Value in a row, greater where it speaks against the pose.
-    of: fn(&Row) -> Option<f64>,
-}
-
-/// The signs, from [`Evidence`].
-const SIGNS: &[Sign] = &[
-    Sign { name: "few inliers", of: |row| Some(-row.inlier_share?) },
-    Sign { name: "contact off the tool", of: |row| Some(1.0 - row.evidence?.on_tool) },
-    Sign { name: "unlike", of: |row| Some(1.0 - row.evidence?.membrane?.likeness) },
-    Sign { name: "membranes elsewhere", of: |row| Some(row.evidence?.membrane?.own.gain) },
-    Sign { name: "fingers apart", of: |row| Some(row.evidence?.membrane?.fingers?.gain) },
-    Sign { name: "better swapped", of: |row| row.evidence?.membrane?.swapped },
-];
-
-/// Share of false alarms at which signs are compared.
-const FALSE_ALARMS: f64 = 0.02;
-
-/// A sign alone, as a detector.
-#[derive(Debug, Serialize)]
-struct SignRow {
-    sign: &'static str,
-    /// Value that all but [`FALSE_ALARMS`] of the good poses stay below: right ones (within 5 degrees) without a fault.
-    limit: Option<f64>,
-    /// For each fault the share of trials beyond it or without a pose, percent.
-    told: Vec<(Fault, f64)>,
 }
 
 /// A fault, and what registration and verdict make of it.
@@ -259,8 +214,6 @@ struct Report {
     faults: Vec<FaultRow>,
     /// Grasps of which all tools of the source are tried and the right one comes first, percent.
     named: f64,
-    signs: Vec<SignRow>,
-    rows: Vec<Row>,
 }
 
 fn of_fault(rows: &[Row], fault: Fault) -> impl Iterator<Item = &Row> {
@@ -269,20 +222,6 @@ fn of_fault(rows: &[Row], fault: Fault) -> impl Iterator<Item = &Row> {
 
 fn is_right(row: &Row) -> bool {
     row.error_deg.is_some_and(|error| error.abs() <= 5.0)
-}
-
-fn signs(rows: &[Row]) -> Vec<SignRow> {
-    let one = |&Sign { name, of }: &Sign| {
-        let good = of_fault(rows, Fault::None).filter(|row| is_right(row)).filter_map(of);
-        let limit = quantile(good, 1.0 - FALSE_ALARMS);
-        let beyond = |row: &&Row| of(row).zip(limit).is_none_or(|(value, limit)| value > limit);
-        let told = |fault| {
-            let (all, told) = (of_fault(rows, fault).count(), of_fault(rows, fault).filter(beyond).count());
-            (fault, 100.0 * told as f64 / all.max(1) as f64)
-        };
-        SignRow { sign: name, limit, told: Fault::iter().filter(|fault| *fault != Fault::None).map(told).collect() }
-    };
-    SIGNS.iter().map(one).collect()
 }
 
 fn text(report: &Report) -> String {
@@ -309,14 +248,9 @@ fn text(report: &Report) -> String {
         );
     }
     text += &format!(
-        "\n{:.1} % of the grasps name their tool when all are tried\nof the first row only the right poses count: they are the false alarms\n\npercent beyond the limit that {} % of the good poses pass, by each sign alone\n",
+        "\n{:.1} % of the grasps name their tool when all are tried\nof the first row only the right poses count: they are the false alarms\n",
         report.named,
-        100.0 * FALSE_ALARMS
     );
-    for row in &report.signs {
-        let told: Vec<String> = row.told.iter().map(|(fault, share)| format!("{fault} {share:.0}")).collect();
-        text += &format!("{:24} {}\n", row.sign, told.join(" | "));
-    }
     text
 }
 
@@ -374,7 +308,7 @@ pub(super) fn run(args: &VerdictArgs) -> VerbResult {
                 let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_mul(7919).wrapping_add(i as u64));
                 rng.set_stream(fault as u64);
                 let trial = Trial::new(fault, &case, &other, &meshes, &mut rng);
-                row(i, fault, &trial, &models, engine)
+                row(fault, &trial, &models, engine)
             })
             .collect()
     };
@@ -385,8 +319,6 @@ pub(super) fn run(args: &VerdictArgs) -> VerbResult {
         engine: args.engine.to_string(),
         faults: Fault::iter().map(|fault| FaultRow::new(&rows, fault)).collect(),
         named: 100.0 * named.count() as f64 / count.max(1) as f64,
-        signs: signs(&rows),
-        rows,
     };
     args.json.write(&report)?;
     output.finish(&report, || text(&report))?;
@@ -404,14 +336,14 @@ fn is_named(case: &Case, models: &[ToolModel], engine: Registration) -> bool {
     ranked.first().is_some_and(|first| first.tool == names[case.tool])
 }
 
-fn row(i: usize, fault: Fault, trial: &Trial, models: &[ToolModel], engine: Registration) -> Row {
+fn row(fault: Fault, trial: &Trial, models: &[ToolModel], engine: Registration) -> Row {
     let case = &trial.case;
     let changed;
     let tool = match &trial.model {
-        Model::Tool(number) => Ok(&models[*number]),
+        Model::Tool(number) => Some(&models[*number]),
         Model::Changed(mesh) => {
-            changed = ToolModel::new(mesh.clone());
-            changed.as_ref().map_err(ToString::to_string)
+            changed = ToolModel::new(mesh.clone()).ok();
+            changed.as_ref()
         }
     };
     let images = images(case);
@@ -419,27 +351,9 @@ fn row(i: usize, fault: Fault, trial: &Trial, models: &[ToolModel], engine: Regi
     let contacts = Contacts { points: &points, images: &images };
     let method = engine.method();
     let ask = Ask { evidence: true, ..Ask::default() };
-    let found = tool.and_then(|tool| register_with(&*method, contacts, tool, ask).map_err(|err| err.to_string()));
-    let mut row = Row {
-        case: i,
-        fault,
-        stratum: case.stratum.to_string(),
-        tool: case.tool,
-        error_deg: None,
-        position_mm: None,
-        off: None,
-        inlier_share: None,
-        evidence: None,
-        verdict: None,
-        why: found.as_ref().err().cloned(),
+    let found = tool.and_then(|tool| register_with(&*method, contacts, tool, ask).ok());
+    let error = |report: &AlignReport| {
+        angle_error(report.grasp_from_object.theta_rad, case.grasp_from_object.theta_rad).to_degrees()
     };
-    let Ok(report) = found else { return row };
-    let (pose, truth) = (report.grasp_from_object, case.grasp_from_object);
-    row.error_deg = Some(angle_error(pose.theta_rad, truth.theta_rad).to_degrees());
-    row.position_mm = Some(position_error_mm(pose, truth));
-    row.inlier_share = Some(report.inlier_share);
-    row.evidence = report.evidence;
-    row.verdict = Verdict::of(&report);
-    row.off = Some([pose.theta_rad - truth.theta_rad, pose.y_m - truth.y_m, pose.z_m - truth.z_m]);
-    row
+    Row { fault, error_deg: found.as_ref().map(error), verdict: found.as_ref().and_then(Verdict::of) }
 }

@@ -13,30 +13,8 @@ use super::sample::DepthCamera;
 
 /// Why an imprint cannot be lifted.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum CloudError {
-    /// Two images that must cover the same pixels do not.
-    #[error("the {what} is {} x {} pixels, the imprint {} x {}: they must be equal", .size[0], .size[1], .imprint[0], .imprint[1])]
-    Size {
-        /// Name of the image that differs.
-        what: &'static str,
-        /// Width and height of that image.
-        size: [usize; 2],
-        /// The imprint's width and height.
-        imprint: [usize; 2],
-    },
-    /// More columns or rows than a pixel address holds.
-    #[error("an imprint of {} x {} pixels is too large: at most 65535 on a side", .size[0], .size[1])]
-    TooLarge {
-        /// Width and height.
-        size: [usize; 2],
-    },
-    /// Focal lengths or principal point cannot be a camera's, or the transform is not finite.
-    #[error("the camera's {what} cannot be right: read them again from the source")]
-    Camera {
-        /// Part of the camera.
-        what: &'static str,
-    },
-}
+#[error("{0}")]
+pub struct CloudError(String);
 
 /// Points of one finger with the pixel each came from.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -106,21 +84,28 @@ fn lift_depth(depth: f64, camera: &DepthCamera, x: usize, y: usize) -> DVec3 {
 /// Checks that the camera can lift `imprint` at all.
 pub(super) fn check(imprint: &DepthMap, camera: &DepthCamera) -> Result<(), CloudError> {
     same_size("reference depth", camera.depth_reference.size(), imprint)?;
-    let size = imprint.size();
-    if size.iter().any(|&n| n > usize::from(u16::MAX)) {
-        return Err(CloudError::TooLarge { size });
+    let [width, height] = imprint.size();
+    if width.max(height) > usize::from(u16::MAX) {
+        let why = format!("an imprint of {width} x {height} pixels is too large: at most 65535 on a side");
+        return Err(CloudError(why));
     }
+    let wrong = |what| CloudError(format!("the camera's {what} cannot be right: read them again from the source"));
     if !camera.intrinsics.is_plausible() {
-        return Err(CloudError::Camera { what: "intrinsics" });
+        return Err(wrong("intrinsics"));
     }
     if !camera.grasp_from_camera.is_finite() {
-        return Err(CloudError::Camera { what: "position in the grasp frame" });
+        return Err(wrong("position in the grasp frame"));
     }
     Ok(())
 }
 
 pub(super) fn same_size(what: &'static str, size: [usize; 2], imprint: &DepthMap) -> Result<(), CloudError> {
-    if size == imprint.size() { Ok(()) } else { Err(CloudError::Size { what, size, imprint: imprint.size() }) }
+    if size == imprint.size() {
+        return Ok(());
+    }
+    let ([width, height], [columns, rows]) = (size, imprint.size());
+    let why = format!("the {what} is {width} x {height} pixels, the imprint {columns} x {rows}: they must be equal");
+    Err(CloudError(why))
 }
 
 #[cfg(test)]
@@ -189,15 +174,17 @@ mod tests {
     #[test]
     fn cameras_that_do_not_fit_are_refused() {
         let camera = testing::camera(4, 2);
-        assert!(matches!(lift(&imprint(), &camera, None), Err(CloudError::Size { what: "reference depth", .. })));
+        let refused =
+            |imprint: &DepthMap, camera: &DepthCamera, mask| lift(imprint, camera, mask).unwrap_err().to_string();
+        assert!(refused(&imprint(), &camera, None).starts_with("the reference depth is 4 x 2 pixels"));
         let small = DepthMap::filled(4, 2, 0.0);
         let mask = Mask::filled(2, 4, true);
-        assert!(matches!(lift(&small, &camera, Some(&mask)), Err(CloudError::Size { what: "mask", .. })));
+        assert!(refused(&small, &camera, Some(&mask)).starts_with("the mask is 2 x 4 pixels"));
         let mut broken = camera.clone();
         broken.intrinsics.fx = f64::NAN;
-        assert_eq!(lift(&small, &broken, None), Err(CloudError::Camera { what: "intrinsics" }));
+        assert!(refused(&small, &broken, None).contains("intrinsics"));
         let mut lost = camera;
         lost.grasp_from_camera.translation.x = f64::INFINITY;
-        assert!(matches!(lift(&small, &lost, None), Err(CloudError::Camera { .. })));
+        assert!(refused(&small, &lost, None).contains("position"));
     }
 }

@@ -16,7 +16,7 @@ mod schedule;
 mod tensor;
 mod watch;
 
-pub use ddim::{DiffusionError, GenerateConfig, Sampler, sample, sample_watched};
+pub use ddim::{DiffusionError, GenerateConfig, Sampler, sample};
 pub use denoiser::{Denoiser, ModelError, Prediction};
 pub use guidance::{GUIDANCE, Guided};
 pub use noise::GaussianNoise;

@@ -36,16 +36,6 @@ impl Spread {
         let both = Grid::from_fn(size[0], size[1], mean_and_std);
         Some(Self { mean: both.map(|v| v.0 as f32), std: both.map(|v| v.1 as f32) })
     }
-
-    /// The mean of the spread over the pixels that have one, meters; NaN if none has.
-    pub fn mean_std(&self) -> f64 {
-        let (mut sum, mut n) = (0.0, 0usize);
-        for &v in self.std.as_slice().iter().filter(|v| v.is_finite()) {
-            sum += f64::from(v);
-            n += 1;
-        }
-        if n == 0 { f64::NAN } else { sum / n as f64 }
-    }
 }
 
 #[cfg(test)]
@@ -61,9 +51,8 @@ mod tests {
         // sqrt((4 + 1 + 9) / 2) mm
         assert!((f64::from(spread.std[(0, 0)]) - 7f64.sqrt() * 1e-3).abs() < 1e-9);
         assert!(spread.mean[(1, 0)].is_nan() && spread.std[(1, 0)].is_nan());
-        assert!((spread.mean_std() - 7f64.sqrt() * 1e-3).abs() < 1e-9);
         let one = Spread::of(&[&images[0]]).unwrap();
-        assert!(one.std[(0, 0)].is_nan() && one.mean[(0, 0)] == 0.001 && one.mean_std().is_nan());
+        assert!(one.std[(0, 0)].is_nan() && one.mean[(0, 0)] == 0.001);
         assert_eq!(Spread::of(&[]), None);
         assert_eq!(Spread::of(&[&images[0], &Grid::filled(3, 1, 0.0)]), None);
         // A spread of a micrometer around a meter survives 32 bits in and out.

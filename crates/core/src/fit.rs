@@ -46,27 +46,8 @@ pub struct FitPair<'a> {
 
 /// Why there is no fit.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum FitError {
-    /// No pair at all.
-    #[error("there is no pair to fit to; choose pairs with both images")]
-    NoPairs,
-    /// Pictures of several sizes.
-    #[error("pair {case} has a picture of {found:?} pixels instead of {expected:?}")]
-    Size {
-        /// Case, counted from 0.
-        case: usize,
-        /// Size of its picture, `[width, height]`, pixels.
-        found: [usize; 2],
-        /// Size of the first picture.
-        expected: [usize; 2],
-    },
-    /// A prediction that is not finite.
-    #[error("the prediction of pair {case} has values that are not finite")]
-    NotFinite {
-        /// Case, counted from 0.
-        case: usize,
-    },
-}
+#[error("{0}")]
+pub struct FitError(String);
 
 /// A picture as numbers to reckon with, row by row.
 type Pixels = Vec<f64>;
@@ -132,15 +113,19 @@ pub fn closed_form(cases: &[FitPair<'_>], pads: usize) -> Result<Vec<Option<Corr
 }
 
 fn check(cases: &[FitPair<'_>]) -> Result<[usize; 2], FitError> {
-    let expected = cases.first().ok_or(FitError::NoPairs)?.prediction.size();
+    let refuse = |why: String| Err(FitError(why));
+    let Some(first) = cases.first() else {
+        return refuse("there is no pair to fit to; choose pairs with both images".into());
+    };
+    let expected = first.prediction.size();
     for (case, one) in cases.iter().enumerate() {
         for size in [one.prediction.size(), one.target.size()] {
             if size != expected || size.contains(&0) {
-                return Err(FitError::Size { case, found: size, expected });
+                return refuse(format!("pair {case} has a picture of {size:?} pixels instead of {expected:?}"));
             }
         }
         if one.prediction.as_slice().iter().any(|v| !v.is_finite()) {
-            return Err(FitError::NotFinite { case });
+            return refuse(format!("the prediction of pair {case} has values that are not finite"));
         }
     }
     Ok(expected)

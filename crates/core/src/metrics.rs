@@ -13,7 +13,7 @@ mod unstretched;
 pub use angle::AngleSummary;
 pub use color::{LEVELS, color, planes};
 pub use frechet::frechet_distance;
-pub use image::{MetricError, Psnr, mse, psnr, unit_range};
+pub use image::{MetricError, mse, psnr, unit_range};
 pub use line::{Line, line};
 pub use ssim::{SsimRange, ssim};
 pub use unstretched::{Unstretched, unstretched};

@@ -168,22 +168,14 @@ pub enum PostprocessError {
     #[error("the prediction has no image, or channels of different size")]
     Malformed,
     /// A range that is empty or not a number.
-    #[error("the depth range {min_m} to {max_m} m is empty")]
-    Range {
-        /// Lower end, meters.
-        min_m: f64,
-        /// Upper end, meters.
-        max_m: f64,
-    },
+    #[error("the depth range {0} to {1} m is empty")]
+    Range(f64, f64),
     /// A color picture was asked for its depth.
     #[error("this model predicts a color picture: it has no depth, and so no contact, points or pose")]
     NotDepth,
     /// Not three channels of one size.
-    #[error("a color picture needs 3 channels of one size, the prediction has {count}; correct the model's manifest")]
-    NotColor {
-        /// Number of its channels.
-        count: usize,
-    },
+    #[error("a color picture needs 3 channels of one size, the prediction has {0}; correct the model's manifest")]
+    NotColor(usize),
     /// A correction for pictures of another size.
     #[error("the fit is for pictures of another size than {0:?} pixels; fit the bundle again")]
     Correction([usize; 2]),
@@ -294,7 +286,7 @@ impl DepthChain {
     fn check(&self) -> Result<(), PostprocessError> {
         let DepthRange { min_m, max_m } = self.range;
         if !self.range.is_valid() {
-            return Err(PostprocessError::Range { min_m, max_m });
+            return Err(PostprocessError::Range(min_m, max_m));
         }
         if !matches!(self.rotation_deg, 0 | 180) {
             return Err(PostprocessError::Rotation(self.rotation_deg));

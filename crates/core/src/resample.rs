@@ -30,7 +30,7 @@ pub enum Resampling {
 impl Resampling {
     /// Resizes a one-channel image to `width × height` pixels.
     pub fn resize(self, image: &Grid<f32>, width: usize, height: usize) -> Grid<f32> {
-        resize(image, width, height, self)
+        resize_gray(image, width, height, self)
     }
 
     /// Resizes a color image to `width × height` pixels, channel by channel.
@@ -43,12 +43,12 @@ impl Resampling {
 ///
 /// NaN pixels make every target pixel NaN that weighs them in. An empty source gives an image of NaN.
 pub fn bilinear(image: &Grid<f32>, width: usize, height: usize) -> Grid<f32> {
-    resize(image, width, height, Resampling::Bilinear)
+    resize_gray(image, width, height, Resampling::Bilinear)
 }
 
 /// The plain mean of the source pixels `floor(i·in/out) .. ceil((i+1)·in/out)`, as torch's `mode="area"`.
 pub fn area(image: &Grid<f32>, width: usize, height: usize) -> Grid<f32> {
-    resize(image, width, height, Resampling::Area)
+    resize_gray(image, width, height, Resampling::Area)
 }
 
 /// The image moved by `[x, y]` pixels (to the right, down), with two taps per axis; the border is repeated where nothing
@@ -97,52 +97,6 @@ pub fn nearest_mask(mask: &Grid<bool>, width: usize, height: usize) -> Grid<bool
     Grid::from_fn(width, height, |x, y| mask[(pick(x, source_width, width), pick(y, source_height, height))])
 }
 
-/// Pixel that [`resize`] can make a weighted sum of, in f64.
-trait Pixel: Copy {
-    type Sum: Copy;
-    const ZERO: Self::Sum;
-    const INVALID: Self;
-    fn add(sum: Self::Sum, pixel: Self, weight: f64) -> Self::Sum;
-    fn add_sum(sum: Self::Sum, other: Self::Sum, weight: f64) -> Self::Sum;
-    fn finish(sum: Self::Sum) -> Self;
-}
-
-impl Pixel for f32 {
-    type Sum = f64;
-    const ZERO: f64 = 0.0;
-    const INVALID: f32 = f32::NAN;
-
-    fn add(sum: f64, pixel: f32, weight: f64) -> f64 {
-        sum + f64::from(pixel) * weight
-    }
-
-    fn add_sum(sum: f64, other: f64, weight: f64) -> f64 {
-        sum + other * weight
-    }
-
-    fn finish(sum: f64) -> f32 {
-        sum as f32
-    }
-}
-
-impl Pixel for [f32; 3] {
-    type Sum = [f64; 3];
-    const ZERO: [f64; 3] = [0.0; 3];
-    const INVALID: [f32; 3] = [f32::NAN; 3];
-
-    fn add(sum: [f64; 3], pixel: [f32; 3], weight: f64) -> [f64; 3] {
-        std::array::from_fn(|c| sum[c] + f64::from(pixel[c]) * weight)
-    }
-
-    fn add_sum(sum: [f64; 3], other: [f64; 3], weight: f64) -> [f64; 3] {
-        std::array::from_fn(|c| sum[c] + other[c] * weight)
-    }
-
-    fn finish(sum: [f64; 3]) -> [f32; 3] {
-        sum.map(|v| v as f32)
-    }
-}
-
 /// The source pixels behind one target pixel along one axis. Weights of zero are left out, so that an invalid
 /// pixel only spoils the pixels that use it.
 fn taps(source: usize, target: usize, kind: Resampling) -> Vec<Vec<(usize, f64)>> {
@@ -185,22 +139,32 @@ fn cubic_weights(t: f64) -> [f64; 4] {
     [far(t + 1.0), near(t), near(1.0 - t), far(2.0 - t)]
 }
 
-fn resize<P: Pixel>(image: &Grid<P>, width: usize, height: usize, kind: Resampling) -> Grid<P> {
+fn resize_gray(image: &Grid<f32>, width: usize, height: usize, kind: Resampling) -> Grid<f32> {
+    resize(&image.map(|&v| [v]), width, height, kind).map(|[v]| *v)
+}
+
+/// Weighted sums of pixels of `N` channels, in f64.
+fn resize<const N: usize>(image: &Grid<[f32; N]>, width: usize, height: usize, kind: Resampling) -> Grid<[f32; N]> {
     if image.size() == [width, height] {
         return image.clone();
     }
     if image.is_empty() || width == 0 || height == 0 {
-        return Grid::filled(width, height, P::INVALID);
+        return Grid::filled(width, height, [f32::NAN; N]);
     }
     let columns = taps(image.width(), width, kind);
     let rows = taps(image.height(), height, kind);
+    let add = |sum: [f64; N], pixel: [f64; N], weight: f64| std::array::from_fn(|c| sum[c] + pixel[c] * weight);
     let mut narrow = Vec::with_capacity(width * image.height());
     for y in 0..image.height() {
         let row = image.row(y);
-        narrow.extend(columns.iter().map(|taps| taps.iter().fold(P::ZERO, |sum, &(x, w)| P::add(sum, row[x], w))));
+        let mixed = |taps: &Vec<(usize, f64)>| {
+            taps.iter().fold([0.0; N], |sum, &(x, weight)| add(sum, row[x].map(f64::from), weight))
+        };
+        narrow.extend(columns.iter().map(mixed));
     }
     Grid::from_fn(width, height, |x, y| {
-        P::finish(rows[y].iter().fold(P::ZERO, |sum, &(row, w)| P::add_sum(sum, narrow[row * width + x], w)))
+        let sum = rows[y].iter().fold([0.0; N], |sum, &(row, weight)| add(sum, narrow[row * width + x], weight));
+        sum.map(|v| v as f32)
     })
 }
 

@@ -156,34 +156,26 @@ impl PadTouch {
 
     /// Reading of the first color sensor that has one.
     pub fn color(&self) -> Option<&ColorTouch> {
-        self.readings.iter().find_map(|(_, reading)| match reading {
-            Reading::Color(touch) => Some(touch),
-            Reading::Depth(_) => None,
-        })
+        let mut readings = self.readings.iter();
+        readings.find_map(|(_, reading)| if let Reading::Color(touch) = reading { Some(touch) } else { None })
     }
 
     /// As [`PadTouch::color`], to be changed.
     pub fn color_mut(&mut self) -> Option<&mut ColorTouch> {
-        self.readings.iter_mut().find_map(|(_, reading)| match reading {
-            Reading::Color(touch) => Some(touch),
-            Reading::Depth(_) => None,
-        })
+        let mut readings = self.readings.iter_mut();
+        readings.find_map(|(_, reading)| if let Reading::Color(touch) = reading { Some(touch) } else { None })
     }
 
     /// Reading of the first depth sensor that has one.
     pub fn depth(&self) -> Option<&DepthTouch> {
-        self.readings.iter().find_map(|(_, reading)| match reading {
-            Reading::Depth(touch) => Some(touch),
-            Reading::Color(_) => None,
-        })
+        let mut readings = self.readings.iter();
+        readings.find_map(|(_, reading)| if let Reading::Depth(touch) = reading { Some(touch) } else { None })
     }
 
     /// As [`PadTouch::depth`], to be changed.
     pub fn depth_mut(&mut self) -> Option<&mut DepthTouch> {
-        self.readings.iter_mut().find_map(|(_, reading)| match reading {
-            Reading::Depth(touch) => Some(touch),
-            Reading::Color(_) => None,
-        })
+        let mut readings = self.readings.iter_mut();
+        readings.find_map(|(_, reading)| if let Reading::Depth(touch) = reading { Some(touch) } else { None })
     }
 
     /// A sensor's reading as a model takes it: the color difference, or the imprint in each of three channels. Pixels of an

@@ -70,7 +70,7 @@ pub fn compare(predicted: &DepthMap, measured: &DepthMap, scale: Scale) -> Resul
     };
     Ok(Comparison {
         error,
-        psnr_db: psnr.db(),
+        psnr_db: psnr,
         ssim: ssim.ok(),
         mae_m: if count == 0 { f64::NAN } else { sum / count as f64 },
         unstretched,

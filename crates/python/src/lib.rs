@@ -21,25 +21,18 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _native {
     #[pymodule_export]
-    use crate::data::{Dataset, Pair, open, simulate};
-    #[pymodule_export]
-    use crate::estimate::{Estimate, Pose, estimate, estimate_many, register, register_many};
-    #[pymodule_export]
-    use crate::masks::{export_masks, label};
-    #[pymodule_export]
-    use crate::measures::{frechet, psnr, ssim};
-    #[pymodule_export]
-    use crate::picture::png;
-    #[pymodule_export]
-    use crate::process::{Cancelled, Refused};
-    #[pymodule_export]
-    use crate::program::main;
-    #[pymodule_export]
-    use crate::recipe::Recipe;
-    #[pymodule_export]
-    use crate::tables::{Scores, adapt, bundles, evaluate};
-    #[pymodule_export]
-    use crate::tool::Tool;
+    use crate::{
+        data::{Dataset, Pair, open, simulate},
+        estimate::{Estimate, Pose, estimate, estimate_many, register, register_many},
+        masks::{export_masks, label},
+        measures::{frechet, psnr, ssim},
+        picture::png,
+        process::{Cancelled, Refused},
+        program::main,
+        recipe::Recipe,
+        tables::{Scores, adapt, bundles, evaluate},
+        tool::Tool,
+    };
 
     #[pymodule_export]
     #[allow(non_upper_case_globals, reason = "the name in Python")]

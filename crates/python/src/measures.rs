@@ -19,7 +19,7 @@ pub(crate) fn psnr(
 ) -> PyResult<f64> {
     let (prediction, truth) = (image_of(&prediction, "prediction")?, image_of(&truth, "truth")?);
     let found = metrics::psnr(&prediction, &truth, peak.unwrap_or(PEAK_M)).map_err(refused)?;
-    Ok(found.db().unwrap_or(f64::INFINITY))
+    Ok(found.unwrap_or(f64::INFINITY))
 }
 
 /// Structural similarity of two images (height, width), float32, as the lab has it: 11 x 11 Gaussian window, zero padding,

@@ -48,16 +48,6 @@ pub enum Error {
         /// Reason.
         why: String,
     },
-    /// A setting is out of its range.
-    #[error("the setting \"{setting}\" is {found}; it must be {must}")]
-    Config {
-        /// Name of the setting.
-        setting: &'static str,
-        /// Value that was given.
-        found: String,
-        /// Range that is allowed.
-        must: &'static str,
-    },
     /// There is nothing to learn from.
     #[error("there is nothing to tune on")]
     NoPairs,

@@ -34,7 +34,7 @@ mod tuner;
 
 pub use augment::Augment;
 pub use closed_form::Placement;
-pub use config::{Config, Trained};
+pub use config::Config;
 pub use error::{Error, Result};
 pub use masks::{Cast, MaskConfig, MaskStart, MaskTouch, MaskTuner, Sensors};
 pub use pair::Pair;

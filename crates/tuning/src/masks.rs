@@ -112,30 +112,6 @@ impl Default for MaskConfig {
     }
 }
 
-impl MaskConfig {
-    fn check(&self) -> Result<()> {
-        let numbers = [
-            ("rate", self.rate),
-            ("decay", self.decay),
-            ("anchor", self.anchor),
-            ("rest", self.rest),
-            ("clip", self.clip),
-        ];
-        let refuse = |setting, found: String, must| Err(Error::Config { setting, found, must });
-        for (setting, value) in numbers {
-            if !(value.is_finite() && value >= 0.0) {
-                return refuse(setting, value.to_string(), "a number of at least 0");
-            }
-        }
-        self.sensors.check()?;
-        match (self.batch, self.steps) {
-            (1..=1024, 1..=1_000_000) => Ok(()),
-            (1..=1024, steps) => refuse("steps", steps.to_string(), "between 1 and 1,000,000"),
-            (batch, _) => refuse("batch", batch.to_string(), "between 1 and 1024"),
-        }
-    }
-}
-
 /// The objective: cross-entropy + (1 − Dice) over variations of the touches.
 #[derive(Debug)]
 struct Recipe {
@@ -211,7 +187,9 @@ impl MaskTuner {
     /// If the network is of another architecture (which weight says so), a setting is out of range, there are no touches,
     /// or one cannot be learned from (which one).
     pub fn new(start: &MaskStart, touches: Vec<MaskTouch>, config: MaskConfig) -> Result<Self> {
-        config.check()?;
+        if config.steps == 0 {
+            return Err(Error::Start { what: "steps", why: "there must be one or more".into() });
+        }
         let [low, high] = start.range_m;
         let span = high - low;
         if !(span.is_finite() && span > 0.0) {
@@ -260,11 +238,11 @@ impl MaskTuner {
     /// # Errors
     /// As [`MaskTuner::probabilities`].
     pub fn probabilities_at_start(&self, imprints: &[&[f32]]) -> Result<Vec<Vec<f32>>> {
-        self.ask(self.trainer.start(), imprints)
+        self.ask(&self.trainer.start, imprints)
     }
 
     fn ask(&self, params: &Params, imprints: &[&[f32]]) -> Result<Vec<Vec<f32>>> {
-        let start = &self.trainer.objective().start;
+        let start = &self.trainer.objective.start;
         let [width, height] = start.size;
         let pixels = width * height;
         if let Some(index) = imprints.iter().position(|imprint| imprint.len() != pixels) {
@@ -288,11 +266,11 @@ impl Descent for MaskTuner {
     }
 
     fn steps_done(&self) -> usize {
-        self.trainer.steps_done()
+        self.trainer.step
     }
 
     fn steps(&self) -> usize {
-        self.trainer.objective().config.steps
+        self.trainer.objective.config.steps
     }
 
     fn to_bytes(&self) -> Vec<u8> {

@@ -2,8 +2,8 @@
 //! denoising step, sometimes two, and through what lies behind the decoder.
 
 use crate::augment::{Augment, Clipping, Set};
-use crate::config::{Config, Trained};
-use crate::nets::generator::{self, DECODER, ENCODER, LATENT, Schedule, Sizes};
+use crate::config::Config;
+use crate::nets::generator::{self, DECODER, LATENT, Schedule, Sizes};
 use crate::ops;
 use crate::optim::Rate;
 use crate::pair::Pair;
@@ -136,17 +136,12 @@ impl Objective for Recipe {
     fn rate(&self, name: &str) -> Option<Rate> {
         let c = &self.config;
         let plain = |rate: f32| (rate > 0.0).then_some(Rate { rate, decay: 0.0, anchor: 0.0 });
-        let network = || {
-            let rate = Rate { rate: c.network_rate, decay: c.decay, anchor: c.anchor };
-            (c.network_rate > 0.0).then_some(rate)
-        };
         match name {
             LINE => plain(c.line_rate),
             SHIFT => plain(c.shift_rate),
             FIELD => plain(c.field_rate),
             _ if LATENT_SCALE.iter().any(|fixed| name.strip_prefix(DECODER) == Some(fixed)) => None,
-            _ if name.starts_with(ENCODER) || c.trained == Trained::All => network(),
-            _ => None,
+            _ => (c.network_rate > 0.0).then_some(Rate { rate: c.network_rate, decay: c.decay, anchor: c.anchor }),
         }
     }
 

@@ -4,7 +4,6 @@
 //! added in their order: the result does not depend on how many cores there are.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::time::Instant;
 
 use crate::error::{Error, Result};
 use crate::optim::{AdamW, Average, Ramp, Rate, norm};
@@ -58,10 +57,6 @@ pub struct StepReport {
     pub step: usize,
     /// The loss before the step.
     pub loss: f32,
-    /// The length of its gradient.
-    pub gradient: f32,
-    /// Duration of the step, seconds.
-    pub seconds: f64,
 }
 
 /// Plan of the descent.
@@ -78,10 +73,11 @@ pub struct Plan {
 /// Weights on their way down.
 #[derive(Debug)]
 pub(crate) struct Trainer<O> {
-    objective: O,
+    pub(crate) objective: O,
     plan: Plan,
     rates: Vec<Option<Rate>>,
-    start: Params,
+    /// The weights before the first step.
+    pub(crate) start: Params,
     pub(crate) params: Params,
     pub(crate) average: Average,
     pub(crate) optimizer: AdamW,
@@ -100,24 +96,9 @@ impl<O: Objective> Trainer<O> {
         Self { objective, plan, rates, params: start.clone(), start, average, optimizer, step: 0, workers }
     }
 
-    /// Objective that is made small.
-    pub(crate) fn objective(&self) -> &O {
-        &self.objective
-    }
-
     /// The running mean of the weights: what the descent is for.
     pub(crate) fn average(&self) -> &Params {
         self.average.params()
-    }
-
-    /// The weights before the first step.
-    pub(crate) fn start(&self) -> &Params {
-        &self.start
-    }
-
-    /// Steps done.
-    pub(crate) fn steps_done(&self) -> usize {
-        self.step
     }
 
     /// One step down.
@@ -129,18 +110,15 @@ impl<O: Objective> Trainer<O> {
         if self.step >= self.plan.ramp.steps {
             return Err(Error::Done(self.plan.ramp.steps));
         }
-        let began = Instant::now();
         let (loss, gradient) = self.slope();
-        let length = norm(&gradient);
-        if !(loss.is_finite() && length.is_finite()) {
+        if !(loss.is_finite() && norm(&gradient).is_finite()) {
             return Err(Error::Diverged { step: self.step + 1 });
         }
         let factor = self.plan.ramp.factor(self.step);
         self.optimizer.step(&mut self.params, &self.start, &gradient, &self.rates, factor, self.plan.clip);
         self.average.add(&self.params, self.step);
         self.step += 1;
-        let seconds = began.elapsed().as_secs_f64();
-        Ok(StepReport { step: self.step, loss, gradient: length as f32, seconds })
+        Ok(StepReport { step: self.step, loss })
     }
 
     /// Loss of the next step's batch, and its gradient.

@@ -93,7 +93,9 @@ impl Tuner {
     /// If the bundle is of another architecture (which weight says so), if a setting is out of range, if there are no
     /// pairs, or if a pair cannot be learned from (which one).
     pub fn new(start: &Start, pairs: Vec<Pair>, config: Config) -> Result<Self> {
-        config.check()?;
+        if config.steps == 0 {
+            return Err(Error::Start { what: "steps", why: "there must be one or more".into() });
+        }
         let Opened { files, model, params } = open(start)?;
         pair::check(&pairs, model.sizes.side, model.pads)?;
         let origin = origin(start, &pairs, &config);
@@ -136,7 +138,7 @@ impl Tuner {
     /// [`Error::Pair`] with the place of a picture that has another size or values that are not numbers, or is of an
     /// unknown pad.
     pub fn predict(&self, queries: &[Query<'_>]) -> Result<Vec<Vec<f32>>> {
-        let model = &self.trainer.objective().model;
+        let model = &self.trainer.objective.model;
         check_queries(queries, model)?;
         let draw = |i: usize| draw(model, &self.trainer.average().leaves(|_| false), self.sampler, queries[i]);
         Ok(self.trainer.side_by_side(queries.len(), draw))
@@ -150,11 +152,11 @@ impl Descent for Tuner {
     }
 
     fn steps_done(&self) -> usize {
-        self.trainer.steps_done()
+        self.trainer.step
     }
 
     fn steps(&self) -> usize {
-        self.trainer.objective().config.steps
+        self.trainer.objective.config.steps
     }
 
     fn to_bytes(&self) -> Vec<u8> {

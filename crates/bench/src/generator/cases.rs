@@ -96,7 +96,7 @@ impl Judge {
             let truth = &truth.ok_or_else(|| anyhow::anyhow!("a simulated grasp knows its truth"))?.imprint;
             let imprint = &imprints[finger.index()];
             mse += 0.5 * metrics::mse(imprint, truth)?;
-            psnr_db[finger.index()] = metrics::psnr(imprint, truth, LAB_PEAK_M)?.db();
+            psnr_db[finger.index()] = metrics::psnr(imprint, truth, LAB_PEAK_M)?;
         }
         Ok(Score { mse_m2: mse, psnr_db, error_rad: self.error_rad(case, (ImprintSource::Predicted, imprints))? })
     }

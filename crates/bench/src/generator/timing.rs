@@ -7,30 +7,24 @@ use serde::Serialize;
 
 use super::cases::Case;
 use crate::figures::quantile;
-use touch2touch_core::diffusion::{GaussianNoise, GenerateConfig, Progress, Tensor};
+use touch2touch_core::diffusion::{GaussianNoise, GenerateConfig, Tensor};
 use touch2touch_core::grid::{DepthMap, RgbGrid};
-use touch2touch_core::postprocess::{RawPrediction, ShiftMode};
+use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_core::rig::{PadId, Rig, lab};
 use touch2touch_core::sample::Sample;
 use touch2touch_pipeline::infer::bundle::{Bundle, TimestepType};
 use touch2touch_pipeline::infer::engine::{EngineKind, Input};
-use touch2touch_pipeline::infer::generator::{Generator, Item, Observer, prepare};
+use touch2touch_pipeline::infer::generator::{Generator, Item, prepare};
 
 /// Pairs of runs for the overhead.
 const PAIRS: usize = 30;
-/// Runs for the warm time and for the price of previews.
+/// Runs for the warm time.
 const WARM: usize = 7;
 
 /// The sampler against the same number of bare graph runs.
 #[derive(Debug, Serialize)]
 pub(super) struct Overhead {
     pub(super) engine: EngineKind,
-    pub(super) pairs: usize,
-    /// Medians, milliseconds of the clock.
-    pub(super) generator_ms: f64,
-    pub(super) bare_ms: f64,
-    /// Median over the pairs of runs, each pair one after the other, in turn.
-    pub(super) percent: f64,
     /// Of the shortest run of each: what is left when other programs are taken out.
     pub(super) percent_of_shortest: f64,
 }
@@ -39,16 +33,10 @@ pub(super) struct Overhead {
 #[derive(Debug, Serialize)]
 pub(super) struct First {
     pub(super) engine: EngineKind,
-    /// Reading and loading the checked bundle's graphs.
-    pub(super) load_ms: f64,
     /// The first result of a freshly loaded generator, without loading.
     pub(super) cold_ms: f64,
     /// Median of later ones.
     pub(super) warm_ms: f64,
-    /// From the start to the first preview; `None` with a single step.
-    pub(super) preview_ms: Option<f64>,
-    /// Delay of the result by previews of one finger every four steps, percent.
-    pub(super) preview_percent: Option<f64>,
 }
 
 fn differences(sample: &Sample) -> anyhow::Result<[&RgbGrid; 2]> {
@@ -69,20 +57,11 @@ pub(crate) fn timed_run(
     sample: &Sample,
     config: &GenerateConfig,
 ) -> anyhow::Result<(f64, [DepthMap; 2])> {
-    run_observed(generator, sample, config, &mut |_| ControlFlow::Continue(()))
-}
-
-fn run_observed(
-    generator: &mut Generator,
-    sample: &Sample,
-    config: &GenerateConfig,
-    observer: &mut dyn Observer,
-) -> anyhow::Result<(f64, [DepthMap; 2])> {
     let images = differences(sample)?;
     generator.forget_conditions();
     let begin = Instant::now();
     let items = [0, 1].map(|image| Item { image, seed: config.seed });
-    let raw = generator.run(&images, &items, config, observer)?;
+    let raw = generator.run(&images, &items, config, &mut |_| ControlFlow::Continue(()))?;
     let chain = generator.spec().depth_chain(ShiftMode::ExactInverse)?;
     let rig = Rig::lab();
     let depth = |finger: PadId| chain.clone().placed(rig.window_share(finger)).run(&raw[finger.index()]);
@@ -133,7 +112,7 @@ pub(super) fn overhead(
     let config = GenerateConfig { guidance: 1.0, ..*config };
     let spec = generator.spec().clone();
     let steps = spec.schedule.steps(config.steps, config.spacing, spec.prediction)?.len();
-    let (mut generated, mut alone, mut percent) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut generated, mut alone) = (f64::INFINITY, f64::INFINITY);
     for index in 0..PAIRS {
         let case = &cases[index % cases.len()];
         let images = differences(&case.sample)?
@@ -149,41 +128,9 @@ pub(super) fn overhead(
             without = bare(generator, &images, &config, steps)?;
             with = timed_run(generator, &case.sample, &config)?.0;
         }
-        percent.push(100.0 * (with / without - 1.0));
-        generated.push(with);
-        alone.push(without);
+        (generated, alone) = (generated.min(with), alone.min(without));
     }
-    let median = |values: &[f64]| quantile(values.iter().copied(), 0.5).unwrap_or(f64::NAN);
-    let least = |values: &[f64]| values.iter().copied().fold(f64::INFINITY, f64::min);
-    Ok(Overhead {
-        engine,
-        pairs: PAIRS,
-        generator_ms: median(&generated),
-        bare_ms: median(&alone),
-        percent: median(&percent),
-        percent_of_shortest: 100.0 * (least(&generated) / least(&alone) - 1.0),
-    })
-}
-
-/// Looks at the first picture on the way, and at every fourth.
-struct Looker {
-    begin: Instant,
-    first_ms: Option<f64>,
-}
-
-impl Observer for Looker {
-    fn progress(&mut self, _: Progress) -> ControlFlow<()> {
-        ControlFlow::Continue(())
-    }
-
-    fn wants_preview(&mut self, after: Progress, item: usize) -> bool {
-        // As the studio does with one finger on screen.
-        item == 0 && (after.step == 1 || after.step.is_multiple_of(4))
-    }
-
-    fn preview(&mut self, _: Progress, _: usize, _: RawPrediction) {
-        self.first_ms.get_or_insert_with(|| ms_since(self.begin));
-    }
+    Ok(Overhead { engine, percent_of_shortest: 100.0 * (generated / alone - 1.0) })
 }
 
 /// Loads the bundle afresh and waits for its first results; hands the loaded generator on.
@@ -193,27 +140,12 @@ pub(super) fn first(
     case: &Case,
     config: &GenerateConfig,
 ) -> anyhow::Result<(First, Generator)> {
-    let begin = Instant::now();
     let mut generator = Generator::open(bundle, engine.into())?;
-    let load_ms = ms_since(begin);
     let (cold_ms, _) = timed_run(&mut generator, &case.sample, config)?;
-    let (mut warm, mut seen, mut previews) = (Vec::new(), Vec::new(), Vec::new());
+    let mut warm = Vec::new();
     for _ in 0..WARM {
         warm.push(timed_run(&mut generator, &case.sample, config)?.0);
-        let mut looker = Looker { begin: Instant::now(), first_ms: None };
-        seen.push(run_observed(&mut generator, &case.sample, config, &mut looker)?.0);
-        previews.extend(looker.first_ms);
     }
-    let median = |values: &[f64]| quantile(values.iter().copied(), 0.5);
-    let ratios: Vec<f64> = seen.iter().zip(&warm).map(|(seen, plain)| 100.0 * (seen / plain - 1.0)).collect();
-    let preview_ms = median(&previews);
-    let first = First {
-        engine,
-        load_ms,
-        cold_ms,
-        warm_ms: median(&warm).unwrap_or(f64::NAN),
-        preview_ms,
-        preview_percent: preview_ms.and_then(|_| median(&ratios)),
-    };
-    Ok((first, generator))
+    let warm_ms = quantile(warm.into_iter(), 0.5).unwrap_or(f64::NAN);
+    Ok((First { engine, cold_ms, warm_ms }, generator))
 }

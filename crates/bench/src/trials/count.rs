@@ -62,20 +62,11 @@ impl Tried {
     }
 }
 
-/// Choice of the robot after a second grasp whose pose is not good either.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub(super) enum After {
-    /// It tries, unless there is no pose at all.
-    Try,
-    /// It gives the tool back to a person.
-    GiveUp,
-}
-
 /// Counts of trials with the verdict in the loop.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub(super) struct Loop {
-    pub(super) after: After,
+    /// What comes after a second grasp whose pose is not good either: the robot tries, unless there is no pose at all.
+    after: &'static str,
     /// Grasps that were made anew.
     pub(super) regrasps: usize,
     /// Trials that ended without an attempt.
@@ -89,7 +80,7 @@ pub(super) struct Loop {
 /// Counts trials with the verdict in the loop: each is its first grasp, and the second where one was made.
 ///
 /// A trial whose first grasp was not good and that has no second one counts as refused.
-pub(super) fn with_verdict(trials: impl IntoIterator<Item = (Tried, Option<Tried>)>, after: After) -> Loop {
+pub(super) fn with_verdict(trials: impl IntoIterator<Item = (Tried, Option<Tried>)>) -> Loop {
     let (mut regrasps, mut refusals, mut count, mut hits, mut tries) = (0, 0, 0, 0, 0);
     for (first, second) in trials {
         count += 1;
@@ -97,7 +88,7 @@ pub(super) fn with_verdict(trials: impl IntoIterator<Item = (Tried, Option<Tried
             Some(first)
         } else {
             regrasps += usize::from(second.is_some());
-            second.filter(|held| held.is_good() || (after == After::Try && held.grade.is_some()))
+            second.filter(|held| held.grade.is_some())
         };
         match held {
             Some(held) => {
@@ -107,7 +98,7 @@ pub(super) fn with_verdict(trials: impl IntoIterator<Item = (Tried, Option<Tried
             None => refusals += 1,
         }
     }
-    Loop { after, regrasps, refusals, per_trial: Share::new(hits, count), per_try: Share::new(hits, tries) }
+    Loop { after: "try", regrasps, refusals, per_trial: Share::new(hits, count), per_try: Share::new(hits, tries) }
 }
 
 #[cfg(test)]
@@ -140,11 +131,8 @@ mod tests {
             // Never a pose.
             (tried(None, false), Some(tried(None, false))),
         ];
-        let found = with_verdict(trials, After::Try);
+        let found = with_verdict(trials);
         assert_eq!((found.regrasps, found.refusals), (3, 1));
         assert_eq!((found.per_trial, found.per_try), (Share::new(3, 5), Share::new(3, 4)));
-        let found = with_verdict(trials, After::GiveUp);
-        assert_eq!((found.regrasps, found.refusals), (3, 2));
-        assert_eq!((found.per_trial, found.per_try), (Share::new(2, 5), Share::new(2, 3)));
     }
 }

@@ -266,6 +266,6 @@ mod tests {
         assert!(of(&DepthMap::filled(SIZE[0], SIZE[1], f32::NAN)).triangles.is_empty());
         let camera = testing::camera(1, 1);
         assert!(membrane(&DepthMap::filled(1, 1, 0.0), &camera).unwrap().triangles.is_empty());
-        assert!(matches!(membrane(&dome(0.0), &camera), Err(CloudError::Size { .. })));
+        assert!(membrane(&dome(0.0), &camera).is_err());
     }
 }

@@ -133,59 +133,20 @@ pub enum DiffusionError {
     /// The model failed.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// Eta outside [0, 1] or NaN.
-    #[error("eta is {0}; choose 0 (deterministic) to 1")]
-    Eta(f64),
-    /// A guidance scale that cannot be used.
-    #[error("the guidance scale is {0}; choose {start} to {end}, 1 for none", start = GUIDANCE.start(), end = GUIDANCE.end())]
-    Guidance(f64),
-    /// Seeds and conditions do not match in number.
-    #[error("{seeds} seeds for {conditions} conditions")]
-    Batch {
-        /// Seeds given.
-        seeds: usize,
-        /// Conditions given.
-        conditions: usize,
-    },
+    /// A choice that cannot be used, and what to choose.
+    #[error("{0}")]
+    Choice(String),
 }
 
-/// Generates one latent per entry of `condition`, all from `config.seed`, so that a batch gives exactly what its
-/// entries give alone.
+/// Generates one latent per entry of `condition`, each from a seed of its own (`config.seed` is not used), so that a batch
+/// gives exactly what its entries give alone.
 ///
-/// The progress closure is called before each step and once at the end; `Break` ends the loop within one step.
+/// The [`Watch`] is told before each step and once at the end, and can end the loop within one step; one that wants them
+/// gets clean latents on the way.
 ///
 /// # Errors
 /// See [`DiffusionError`].
 pub fn sample(
-    denoiser: &mut dyn Denoiser,
-    schedule: &Schedule,
-    config: &GenerateConfig,
-    condition: &Tensor,
-    progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
-) -> Result<Latent, DiffusionError> {
-    sample_seeds(denoiser, schedule, config, &vec![config.seed; condition.batch()], condition, progress)
-}
-
-/// As [`sample`], with a seed of its own for each entry of the batch (`config.seed` is not used).
-///
-/// # Errors
-/// See [`DiffusionError`].
-pub(crate) fn sample_seeds(
-    denoiser: &mut dyn Denoiser,
-    schedule: &Schedule,
-    config: &GenerateConfig,
-    seeds: &[u64],
-    condition: &Tensor,
-    mut progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
-) -> Result<Latent, DiffusionError> {
-    sample_watched(denoiser, schedule, config, seeds, condition, &mut progress)
-}
-
-/// As [`sample_seeds`], with clean latents on the way for a [`Watch`] that wants them.
-///
-/// # Errors
-/// See [`DiffusionError`].
-pub fn sample_watched(
     denoiser: &mut dyn Denoiser,
     schedule: &Schedule,
     config: &GenerateConfig,
@@ -194,13 +155,16 @@ pub fn sample_watched(
     watch: &mut dyn Watch,
 ) -> Result<Latent, DiffusionError> {
     if !(0.0..=1.0).contains(&config.eta) {
-        return Err(DiffusionError::Eta(config.eta));
+        return Err(DiffusionError::Choice(format!("eta is {}; choose 0 (deterministic) to 1", config.eta)));
     }
     if !GUIDANCE.contains(&config.guidance) {
-        return Err(DiffusionError::Guidance(config.guidance));
+        let (scale, start, end) = (config.guidance, GUIDANCE.start(), GUIDANCE.end());
+        let why = format!("the guidance scale is {scale}; choose {start} to {end}, 1 for none");
+        return Err(DiffusionError::Choice(why));
     }
     if seeds.len() != condition.batch() {
-        return Err(DiffusionError::Batch { seeds: seeds.len(), conditions: condition.batch() });
+        let why = format!("{} seeds for {} conditions", seeds.len(), condition.batch());
+        return Err(DiffusionError::Choice(why));
     }
     let prediction = denoiser.prediction();
     let steps = schedule.steps(config.steps, config.spacing, prediction)?;

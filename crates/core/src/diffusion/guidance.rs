@@ -72,7 +72,7 @@ impl Denoiser for Guided<'_> {
 mod tests {
     use std::ops::ControlFlow;
 
-    use super::super::{GenerateConfig, Schedule, sample};
+    use super::super::{GenerateConfig, Progress, Schedule, sample};
     use super::*;
 
     /// Says that the clean sample is the mean of the condition; counts its calls and the largest batch.
@@ -108,7 +108,15 @@ mod tests {
         let mut guided = Guided::new(echo, Tensor::filled(vec![3], blank), scale);
         let schedule = Schedule::scaled_linear(1000, 0.0015, 0.0155).unwrap();
         let config = GenerateConfig { steps: 5, ..Default::default() };
-        sample(&mut guided, &schedule, &config, &condition, &mut |_| ControlFlow::Continue(())).unwrap()
+        sample(
+            &mut guided,
+            &schedule,
+            &config,
+            &vec![config.seed; condition.batch()],
+            &condition,
+            &mut |_: Progress| ControlFlow::Continue(()),
+        )
+        .unwrap()
     }
 
     #[test]

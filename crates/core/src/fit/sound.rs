@@ -1,6 +1,4 @@
-//! Objections to a fit: figures that no sensor leads to, and predictions that do not know their own measurement.
-
-use std::fmt;
+//! Objections to a fit, in words: figures that no sensor leads to, and predictions that do not know their own measurement.
 
 use rayon::prelude::*;
 
@@ -39,79 +37,6 @@ pub struct FoundPad<'a> {
     pub window: Option<[[f64; 2]; 2]>,
 }
 
-/// A reason not to use a fit.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Objection {
-    /// Measurements rise against the predictions of a pad, or too little or too much with them.
-    Gain {
-        /// The pad.
-        pad: String,
-        /// Meters measured per meter predicted.
-        gain: f64,
-    },
-    /// The drawn window was moved off the sensor's window, or off the picture.
-    Offset {
-        /// The pad.
-        pad: String,
-        /// `[right, down]`, pixels.
-        offset_px: [f64; 2],
-    },
-    /// The in-hand angle is worse with the fit than without.
-    Angle {
-        /// Mean errors before and after, radians; `None` after it where no grasp has a pose any more.
-        mean_rad: [Option<f64>; 2],
-        /// Grasps without a pose, of how many.
-        failed: [usize; 3],
-    },
-    /// Predictions are no nearer to their own measurements than to those of other touches.
-    Strangers {
-        /// The share of the others that the own one is nearer than; 0.5 is chance.
-        nearness: f64,
-        /// Touches that were compared.
-        touches: usize,
-    },
-}
-
-impl fmt::Display for Objection {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Gain { pad, gain } if *gain < 0.0 => write!(
-                f,
-                "{pad}: less is measured where more is predicted (gain {gain:.3}). Wrong sign of the imprints, or fingers \
-                 swapped?"
-            ),
-            Self::Gain { pad, gain } => write!(
-                f,
-                "{pad}: measured depth is {gain:.3} times the predicted one (expected {} to {}). Imprints in another unit, or \
-                 not of these GelSlim images?",
-                GAINS.start(),
-                GAINS.end()
-            ),
-            Self::Offset { pad, offset_px: [x, y] } => write!(
-                f,
-                "{pad}: the fit would shift predictions {x:+.1} px right and {y:+.1} px down, off the window of the sensor. \
-                 Imprints turned, mirrored, of the other finger, or not of these GelSlim images?"
-            ),
-            Self::Angle { mean_rad: [before, after], failed: [lost_before, lost_after, all] } => {
-                let degrees = |rad: &Option<f64>| rad.map_or("none".to_owned(), |v| format!("{:.1}°", v.to_degrees()));
-                write!(
-                    f,
-                    "the in-hand angle gets worse: mean error {} -> {}, {lost_before} -> {lost_after} of {all} grasps \
-                     without a pose. Do these imprints belong to these poses?",
-                    degrees(before),
-                    degrees(after)
-                )
-            }
-            Self::Strangers { nearness, touches } => write!(
-                f,
-                "predictions do not match their own imprints: over {touches} touches, the own imprint is closer than {:.0} % of \
-                 the others (50 % is chance). GelSlim images of other grasps or fingers, or all grasps alike?",
-                100.0 * nearness
-            ),
-        }
-    }
-}
-
 /// Lengths in the pictures of a fit are below this, meters: no membrane is pushed in so far.
 const MOST_M: f32 = 0.1;
 /// Factors are below this, and a line's gain is above its inverse.
@@ -120,7 +45,7 @@ const MOST_TIMES: f32 = 100.0;
 const MOST_ANSWER: f32 = 100.0;
 
 /// Numbers that no fit has, whatever it was made from: those of a file that was changed or is damaged. A fit that is only
-/// doubtful ([`Objection`]) has none.
+/// doubtful has none.
 pub fn absurd(fit: &PadFit) -> Option<String> {
     let one = &fit.correction;
     let [width, height] = one.mean.size();
@@ -150,14 +75,25 @@ pub fn absurd(fit: &PadFit) -> Option<String> {
 }
 
 /// Objections to the figures of a fit: its gains and offsets.
-pub fn figures(cases: &[FitPair<'_>], pads: &[Option<FoundPad<'_>>]) -> Vec<Objection> {
+pub fn figures(cases: &[FitPair<'_>], pads: &[Option<FoundPad<'_>>]) -> Vec<String> {
     let mut out = Vec::new();
     for (number, pad) in pads.iter().enumerate() {
         let Some(pad) = pad else { continue };
         let own: Vec<&FitPair<'_>> = cases.iter().filter(|case| case.pad == number).collect();
-        let gain = slope(&own, pad.correction);
-        if gain.is_some_and(|gain| !GAINS.contains(&gain)) || !GAINS.contains(&pad.correction.line[0]) {
-            out.push(Objection::Gain { pad: pad.name.to_owned(), gain: gain.unwrap_or(pad.correction.line[0]) });
+        let (name, found) = (pad.name, slope(&own, pad.correction));
+        let gain = found.unwrap_or(pad.correction.line[0]);
+        let odd = !GAINS.contains(&gain) || !GAINS.contains(&pad.correction.line[0]);
+        if odd && gain < 0.0 {
+            out.push(format!(
+                "{name}: less is measured where more is predicted (gain {gain:.3}). Wrong sign of the imprints, or fingers \
+                 swapped?"
+            ));
+        } else if odd {
+            let (least, most) = (GAINS.start(), GAINS.end());
+            out.push(format!(
+                "{name}: measured depth is {gain:.3} times the predicted one (expected {least} to {most}). Imprints in \
+                 another unit, or not of these GelSlim images?"
+            ));
         }
         let offset_px = pad.correction.offset_px;
         let size = pad.correction.mean.size();
@@ -166,7 +102,11 @@ pub fn figures(cases: &[FitPair<'_>], pads: &[Option<FoundPad<'_>>]) -> Vec<Obje
             None => (0..2).any(|i| offset_px[i].abs() > size[i] as f64 / 2.0),
         };
         if off {
-            out.push(Objection::Offset { pad: pad.name.to_owned(), offset_px });
+            let [x, y] = offset_px;
+            out.push(format!(
+                "{name}: the fit would shift predictions {x:+.1} px right and {y:+.1} px down, off the window of the sensor. \
+                 Imprints turned, mirrored, of the other finger, or not of these GelSlim images?"
+            ));
         }
     }
     out
@@ -188,7 +128,7 @@ fn slope(cases: &[&FitPair<'_>], correction: &Correction) -> Option<f64> {
 }
 
 /// Objection to the fit by the angle's errors.
-pub fn angle(before: &AngleSummary, after: &AngleSummary) -> Option<Objection> {
+pub fn angle(before: &AngleSummary, after: &AngleSummary) -> Option<String> {
     let worse = |of: fn(&AngleSummary) -> Option<f64>| match [of(before), of(after)] {
         [Some(before), Some(after)] => after > before * (1.0 + ANGLE_SHARE) + ANGLE_RAD.to_degrees(),
         [before, after] => before.is_some() && after.is_none(),
@@ -198,18 +138,31 @@ pub fn angle(before: &AngleSummary, after: &AngleSummary) -> Option<Objection> {
     // One grasp of few that is lost either way moves the mean by as much as it likes.
     let worse = worse(|angle| angle.mean_deg) && (worse(|angle| angle.median_deg) || held[0] > held[1] + chance);
     let lost = after.failed as f64 > before.failed as f64 + chance;
-    let mean_rad = [before, after].map(|angle| angle.mean_deg.map(f64::to_radians));
-    let failed = [before.failed, after.failed, after.count];
-    (worse || lost).then_some(Objection::Angle { mean_rad, failed })
+    let [mean, mean_after] =
+        [before, after].map(|angle| angle.mean_deg.map_or("none".to_owned(), |deg| format!("{deg:.1}°")));
+    let (failed, failed_after, all) = (before.failed, after.failed, after.count);
+    (worse || lost).then(|| {
+        format!(
+            "the in-hand angle gets worse: mean error {mean} -> {mean_after}, {failed} -> {failed_after} of {all} grasps \
+             without a pose. Do these imprints belong to these poses?"
+        )
+    })
 }
 
 /// Objection that predictions do not know their own measurements: `left_out` are those by fits without the case. `None`
 /// for few touches.
-pub fn strangers(cases: &[FitPair<'_>], left_out: &[Option<DepthMap>]) -> Option<Objection> {
+pub fn strangers(cases: &[FitPair<'_>], left_out: &[Option<DepthMap>]) -> Option<String> {
     let pads = cases.iter().map(|case| case.pad + 1).max().unwrap_or_default();
     let ranks: Vec<f64> = (0..pads).flat_map(|pad| nearness(cases, left_out, pad)).collect();
     let nearness = ranks.iter().sum::<f64>() / ranks.len() as f64;
-    (nearness < LEAST_NEARNESS).then_some(Objection::Strangers { nearness, touches: ranks.len() })
+    (nearness < LEAST_NEARNESS).then(|| {
+        format!(
+            "predictions do not match their own imprints: over {} touches, the own imprint is closer than {:.0} % of the \
+             others (50 % is chance). GelSlim images of other grasps or fingers, or all grasps alike?",
+            ranks.len(),
+            100.0 * nearness
+        )
+    })
 }
 
 /// For each touch of a pad the share of the others whose deviation from the pad's mean is less like its own prediction's
@@ -284,7 +237,7 @@ mod tests {
     }
 
     /// The objections to a fit of bumps to `target` of each.
-    fn objections(target: impl Fn(usize) -> DepthMap, window: Option<[[f64; 2]; 2]>) -> Vec<Objection> {
+    fn objections(target: impl Fn(usize) -> DepthMap, window: Option<[[f64; 2]; 2]>) -> Vec<String> {
         let predictions: Vec<DepthMap> = (0..12).map(|i| bump(i, 0.004)).collect();
         let targets: Vec<DepthMap> = (0..12).map(target).collect();
         let cases: Vec<FitPair<'_>> = predictions
@@ -304,14 +257,13 @@ mod tests {
     #[test]
     fn a_fit_to_the_right_imprints_is_not_objected_to() {
         for scale in [0.5, 1.0, 2.0] {
-            assert_eq!(objections(|i| bump(i, 0.004 * scale), None), []);
+            assert_eq!(objections(|i| bump(i, 0.004 * scale), None), Vec::<String>::new());
         }
     }
 
     #[test]
     fn another_unit_sign_place_or_touch_is() {
-        let said =
-            |objections: Vec<Objection>| objections.iter().map(Objection::to_string).collect::<Vec<_>>().join("; ");
+        let said = |objections: Vec<String>| objections.join("; ");
         assert!(said(objections(|i| bump(i, 4.0), None)).contains("another unit"));
         assert!(said(objections(|i| bump(i, -0.004), None)).contains("less is measured"));
         assert!(said(objections(|i| bump(i, 0.004), Some([[20.0, 0.0], [9.0, 9.0]]))).contains("off the window"));
@@ -327,9 +279,9 @@ mod tests {
         let fine = of(&[0.5, 1.0, 1.5]);
         assert_eq!(angle(&fine, &of(&[0.9, 1.4, 1.9])), None);
         assert_eq!(angle(&of(&[20.0; 3]), &of(&[23.0; 3])), None);
-        let grown = angle(&fine, &of(&[11.0, 12.0, 11.2])).unwrap().to_string();
+        let grown = angle(&fine, &of(&[11.0, 12.0, 11.2])).unwrap();
         assert!(grown.contains("1.0° -> 11.4°"), "{grown}");
-        let gone = angle(&fine, &of(&[f64::NAN; 3])).unwrap().to_string();
+        let gone = angle(&fine, &of(&[f64::NAN; 3])).unwrap();
         assert!(gone.contains("none") && gone.contains("0 -> 3 of 3"), "{gone}");
         assert!(angle(&fine, &of(&[0.5, f64::NAN, f64::NAN])).is_some());
     }

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::marks::Marks;
 use super::provenance::Provenance;
-use super::rle::{RleError, decode_runs, encode_runs};
+use super::rle::{decode_runs, encode_runs};
 use crate::grid::{Grid, Mask};
 
 /// A corrected mask in few bytes.
@@ -25,16 +25,10 @@ pub struct PackedMask {
     layer_runs: Vec<(u8, u32)>,
 }
 
-/// A packed mask that is none.
+/// A packed mask that is none: runs or provenances do not fill it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum PackError {
-    /// The runs do not fill the mask.
-    #[error(transparent)]
-    Runs(#[from] RleError),
-    /// The provenances do not fill it.
-    #[error("the provenances do not cover the mask's pixels")]
-    Layers,
-}
+#[error("the packed mask does not cover its pixels")]
+pub struct PackError;
 
 impl PackedMask {
     /// Packs a mask with its marks, which are as large.
@@ -62,15 +56,18 @@ impl PackedMask {
     /// [`PackError`] if it is damaged.
     pub fn unpack(&self) -> Result<(Mask, Marks), PackError> {
         let [width, height] = [self.width, self.height];
-        let mask = decode_runs(width, height, &self.runs)?;
+        let mask = decode_runs(width, height, &self.runs).ok_or(PackError)?;
         let covered: u64 = self.layer_runs.iter().map(|(_, n)| u64::from(*n)).sum();
         if covered != mask.len() as u64 {
-            return Err(PackError::Layers);
+            return Err(PackError);
         }
         let of = self.layer_runs.iter().flat_map(|&(layer, n)| std::iter::repeat_n(layer, n as usize)).collect();
-        let of = Grid::from_vec(width, height, of).map_err(|_| PackError::Layers)?;
-        let ignored = if self.ignored.is_empty() { None } else { Some(decode_runs(width, height, &self.ignored)?) };
-        let marks = Marks::from_parts(self.layers.clone(), of, ignored).ok_or(PackError::Layers)?;
+        let of = Grid::from_vec(width, height, of).map_err(|_| PackError)?;
+        let ignored = match &self.ignored[..] {
+            [] => None,
+            runs => Some(decode_runs(width, height, runs).ok_or(PackError)?),
+        };
+        let marks = Marks::from_parts(self.layers.clone(), of, ignored).ok_or(PackError)?;
         Ok((mask, marks))
     }
 

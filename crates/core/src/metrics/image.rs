@@ -1,45 +1,19 @@
 //! Pixel errors: MSE and PSNR, and the scaling to 0..1.
 
-use serde::Serialize;
-
 use crate::grid::Grid;
 
 /// Why two images cannot be compared.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum MetricError {
-    /// Different sizes.
-    #[error("a prediction of {}x{} pixels cannot be compared with a truth of {}x{}", prediction[0], prediction[1], truth[0], truth[1])]
-    Size {
-        /// `[width, height]`.
-        prediction: [usize; 2],
-        /// `[width, height]`.
-        truth: [usize; 2],
-    },
+    /// Different sizes `[width, height]` of prediction and truth.
+    #[error("a prediction of {}x{} pixels cannot be compared with a truth of {}x{}", .0[0], .0[1], .1[0], .1[1])]
+    Size([usize; 2], [usize; 2]),
     /// No pixel is a number in both images.
     #[error("no pixel is a number in both images")]
     Nothing,
     /// A range or peak that is zero, negative or not a number.
     #[error("the value range {0} is not a positive number")]
     Range(f64),
-}
-
-/// The peak signal-to-noise ratio. Equal images have none, and must not be averaged with the others.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub enum Psnr {
-    /// Decibels.
-    Db(f64),
-    /// The images are equal.
-    Equal,
-}
-
-impl Psnr {
-    /// Decibels, `None` for equal images.
-    pub fn db(self) -> Option<f64> {
-        match self {
-            Psnr::Db(db) => Some(db),
-            Psnr::Equal => None,
-        }
-    }
 }
 
 /// The mean squared difference over the pixels that are finite in both images, in squared units of the images.
@@ -58,11 +32,12 @@ pub fn mse(prediction: &Grid<f32>, truth: &Grid<f32>) -> Result<f64, MetricError
     if count == 0 { Err(MetricError::Nothing) } else { Ok(sum / count as f64) }
 }
 
-/// `20·log10(peak / √MSE)`. The lab's peak is 0.0225 m; images scaled to 0..1 have 1.
+/// Peak signal-to-noise ratio `20·log10(peak / √MSE)`, decibels; `None` for equal images, which must not be averaged with
+/// others. The lab's peak is 0.0225 m; images scaled to 0..1 have 1.
 ///
 /// # Errors
 /// As [`mse`]; [`MetricError::Range`] for a peak that is not positive.
-pub fn psnr(prediction: &Grid<f32>, truth: &Grid<f32>, peak: f64) -> Result<Psnr, MetricError> {
+pub fn psnr(prediction: &Grid<f32>, truth: &Grid<f32>, peak: f64) -> Result<Option<f64>, MetricError> {
     psnr_of_mse(mse(prediction, truth)?, peak)
 }
 
@@ -70,11 +45,11 @@ pub fn psnr(prediction: &Grid<f32>, truth: &Grid<f32>, peak: f64) -> Result<Psnr
 ///
 /// # Errors
 /// [`MetricError::Range`] for a peak that is not positive.
-pub(crate) fn psnr_of_mse(mse: f64, peak: f64) -> Result<Psnr, MetricError> {
+pub(crate) fn psnr_of_mse(mse: f64, peak: f64) -> Result<Option<f64>, MetricError> {
     if !(peak > 0.0 && peak.is_finite()) {
         return Err(MetricError::Range(peak));
     }
-    Ok(if mse == 0.0 { Psnr::Equal } else { Psnr::Db(20.0 * peak.log10() - 10.0 * mse.log10()) })
+    Ok((mse != 0.0).then(|| 20.0 * peak.log10() - 10.0 * mse.log10()))
 }
 
 /// The image stretched so that its smallest finite value becomes 0 and its largest 1.
@@ -97,11 +72,8 @@ pub fn unit_range(image: &Grid<f32>) -> Grid<f32> {
 }
 
 pub(super) fn check_size(prediction: &Grid<f32>, truth: &Grid<f32>) -> Result<(), MetricError> {
-    if prediction.size() == truth.size() {
-        Ok(())
-    } else {
-        Err(MetricError::Size { prediction: prediction.size(), truth: truth.size() })
-    }
+    let (found, expected) = (prediction.size(), truth.size());
+    if found == expected { Ok(()) } else { Err(MetricError::Size(found, expected)) }
 }
 
 #[cfg(test)]
@@ -112,10 +84,10 @@ mod tests {
     fn psnr_needs_a_peak_and_keeps_equal_images_apart() {
         let a = Grid::filled(4, 4, 0.5f32);
         let b = Grid::filled(4, 4, 0.25f32);
-        assert_eq!(psnr(&a, &b, 1.0), Ok(Psnr::Db(-10.0 * 0.0625f64.log10())));
-        assert_eq!(psnr(&a, &a, 1.0), Ok(Psnr::Equal));
+        assert_eq!(psnr(&a, &b, 1.0), Ok(Some(-10.0 * 0.0625f64.log10())));
+        assert_eq!(psnr(&a, &a, 1.0), Ok(None));
         // The range decides the figure: 255 against 1 is 48.1 dB more.
-        let difference = psnr(&a, &b, 255.0).unwrap().db().unwrap() - psnr(&a, &b, 1.0).unwrap().db().unwrap();
+        let difference = psnr(&a, &b, 255.0).unwrap().unwrap() - psnr(&a, &b, 1.0).unwrap().unwrap();
         assert!((difference - 20.0 * 255f64.log10()).abs() < 1e-9);
         for peak in [0.0, -1.0, f64::NAN, f64::INFINITY] {
             assert!(matches!(psnr(&a, &b, peak), Err(MetricError::Range(_))));
@@ -129,7 +101,7 @@ mod tests {
         a[(1, 0)] = f32::NAN;
         assert_eq!(mse(&a, &b), Ok(1.0));
         assert_eq!(mse(&Grid::filled(3, 1, f32::NAN), &b), Err(MetricError::Nothing));
-        assert!(matches!(mse(&Grid::filled(1, 3, 0.0), &b), Err(MetricError::Size { .. })));
+        assert!(matches!(mse(&Grid::filled(1, 3, 0.0), &b), Err(MetricError::Size(..))));
         let empty = Grid::from_vec(0, 0, vec![]).unwrap();
         assert_eq!(mse(&empty, &empty), Err(MetricError::Nothing));
     }

@@ -127,20 +127,21 @@ mod tests {
         (prediction, truth)
     }
 
+    fn grid(case: &Value, key: &str) -> Grid<f32> {
+        let data = case[key].as_array().unwrap().iter().map(|v| v.as_f64().unwrap() as f32).collect();
+        let size = |k: &str| case[k].as_u64().unwrap() as usize;
+        Grid::from_vec(size("width"), size("height"), data).unwrap()
+    }
+
     #[test]
     fn agrees_with_an_independent_implementation() {
         let reference: Value = serde_json::from_str(include_str!("../../tests/data/ssim.json")).unwrap();
         for case in reference["cases"].as_array().unwrap() {
-            let grid = |key: &str| {
-                let data = case[key].as_array().unwrap().iter().map(|v| v.as_f64().unwrap() as f32).collect();
-                let size = |k: &str| case[k].as_u64().unwrap() as usize;
-                Grid::from_vec(size("width"), size("height"), data).unwrap()
-            };
             let range = match case["range"].as_f64() {
                 Some(range) => SsimRange::Explicit(range),
                 None => SsimRange::OfPrediction,
             };
-            let similarity = ssim(&grid("prediction"), &grid("truth"), range).unwrap();
+            let similarity = ssim(&grid(case, "prediction"), &grid(case, "truth"), range).unwrap();
             let expected = case["ssim"].as_f64().unwrap();
             // Both sides work in f64 on the same f32 pixels.
             assert!((similarity - expected).abs() < 1e-9, "{similarity} for {expected}");
@@ -151,14 +152,9 @@ mod tests {
     fn the_psnr_is_that_of_scikit_image() {
         let reference: Value = serde_json::from_str(include_str!("../../tests/data/scikit_image.json")).unwrap();
         for case in reference["images"].as_array().unwrap() {
-            let grid = |key: &str| {
-                let data = case[key].as_array().unwrap().iter().map(|v| v.as_f64().unwrap() as f32).collect();
-                let size = |k: &str| case[k].as_u64().unwrap() as usize;
-                Grid::from_vec(size("width"), size("height"), data).unwrap()
-            };
             let value = |key: &str| case[key].as_f64().unwrap();
-            let (prediction, truth, range) = (grid("prediction"), grid("truth"), value("range"));
-            let db = super::super::psnr(&prediction, &truth, range).unwrap().db().unwrap();
+            let (prediction, truth, range) = (grid(case, "prediction"), grid(case, "truth"), value("range"));
+            let db = super::super::psnr(&prediction, &truth, range).unwrap().unwrap();
             assert!((db - value("psnr")).abs() < 1e-6, "{db} for {}", value("psnr"));
         }
     }

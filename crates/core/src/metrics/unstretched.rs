@@ -27,9 +27,9 @@ pub struct Unstretched {
 /// If the sizes differ, no pixel is a number in both, or the range is not positive.
 pub fn unstretched(prediction: &Grid<f32>, truth: &Grid<f32>, range: f64) -> Result<Unstretched, MetricError> {
     Ok(Unstretched {
-        psnr_raw_db: psnr(prediction, truth, range)?.db(),
+        psnr_raw_db: psnr(prediction, truth, range)?,
         ssim_raw: ssim(prediction, truth, SsimRange::Explicit(range)).ok(),
-        psnr_line_db: psnr_of_mse(line_mse(prediction, truth)?, range)?.db(),
+        psnr_line_db: psnr_of_mse(line_mse(prediction, truth)?, range)?,
     })
 }
 

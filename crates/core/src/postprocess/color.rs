@@ -32,9 +32,9 @@ impl ColorChain {
     /// # Errors
     /// [`PostprocessError::NotColor`] unless there are three channels of one size.
     pub fn run(&self, raw: &RawPrediction) -> Result<RgbGrid, PostprocessError> {
-        let [r, g, b] = &raw.channels[..] else { return Err(PostprocessError::NotColor { count: raw.channels.len() }) };
+        let [r, g, b] = &raw.channels[..] else { return Err(PostprocessError::NotColor(raw.channels.len())) };
         if r.size() != g.size() || r.size() != b.size() {
-            return Err(PostprocessError::NotColor { count: raw.channels.len() });
+            return Err(PostprocessError::NotColor(raw.channels.len()));
         }
         let [lo, hi] = self.range;
         let value = |v: f32| ((f64::from(v) + 1.0) / 2.0 * (hi - lo) + lo) as f32;

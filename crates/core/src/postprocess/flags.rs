@@ -139,32 +139,32 @@ fn correlation(a: &Grid<f32>, b: &Grid<f32>) -> Option<f64> {
 struct List(Vec<Flag>);
 
 impl List {
-    fn add(&mut self, severity: Severity, kind: FlagKind, [what, why, action]: [String; 3]) {
-        self.0.push(Flag { severity, kind, what, why, action });
+    fn wrong(&mut self, kind: FlagKind, what: String, why: &str, action: &str) {
+        let (why, action) = (why.to_owned(), action.to_owned());
+        self.0.push(Flag { severity: Severity::Wrong, kind, what, why, action });
+    }
+
+    fn caution(&mut self, kind: FlagKind, what: String, why: &str, action: &str) {
+        let (why, action) = (why.to_owned(), action.to_owned());
+        self.0.push(Flag { severity: Severity::Caution, kind, what, why, action });
     }
 
     fn numbers(&mut self, seen: &[Seen]) {
         // Where it begins; later images only carry it on.
         if let Some(bad) = seen.iter().find(|s| s.stats.count < s.len) {
-            self.add(
-                Severity::Wrong,
+            self.wrong(
                 FlagKind::NotFinite,
-                [
-                    format!("{} of {} values are not numbers.", bad.len - bad.stats.count, bad.len),
-                    "A model that gives NaN or infinity has met an input or a schedule it cannot take.".into(),
-                    "Generate again with another sampler or more steps; if it stays, check the bundle.".into(),
-                ],
+                format!("{} of {} values are not numbers.", bad.len - bad.stats.count, bad.len),
+                "A model that gives NaN or infinity has met an input or a schedule it cannot take.",
+                "Generate again with another sampler or more steps; if it stays, check the bundle.",
             );
         }
         if let Some(flat) = seen.iter().find(|s| s.stats.is_flat() && s.len > 1) {
-            self.add(
-                Severity::Wrong,
+            self.wrong(
                 FlagKind::Constant,
-                [
-                    format!("All values are {}.", flat.text(flat.stats.mean)),
-                    "An imprint has a touched and an untouched part; a constant image shows neither.".into(),
-                    "Check that the GelSlim image shows a contact and that the bundle fits this sensor.".into(),
-                ],
+                format!("All values are {}.", flat.text(flat.stats.mean)),
+                "An imprint has a touched and an untouched part; a constant image shows neither.",
+                "Check that the GelSlim image shows a contact and that the bundle fits this sensor.",
             );
         }
     }
@@ -176,17 +176,14 @@ impl List {
         if clamped == 0 || share < CLAMPED {
             return;
         }
-        self.add(
-            Severity::Caution,
+        self.caution(
             FlagKind::Clamped,
-            [
-                format!(
-                    "{clamped} of {count} decoder values ({}) were outside -1 to 1 and were clamped.",
-                    text_percent(share)
-                ),
-                "Beyond its range the model cannot say how deep: those pixels read the end of the range.".into(),
-                "Check the bundle's output range, or use more steps.".into(),
-            ],
+            format!(
+                "{clamped} of {count} decoder values ({}) were outside -1 to 1 and were clamped.",
+                text_percent(share)
+            ),
+            "Beyond its range the model cannot say how deep: those pixels read the end of the range.",
+            "Check the bundle's output range, or use more steps.",
         );
     }
 
@@ -208,14 +205,11 @@ impl List {
         }
         let apart_m = meters_per_unit * (sum / count.max(1) as f64).sqrt();
         if apart_m > CHANNELS_APART_M {
-            self.add(
-                Severity::Caution,
+            self.caution(
                 FlagKind::ChannelsApart,
-                [
-                    format!("The {n} channels disagree by {} (root mean square).", text_mm(apart_m)),
-                    "They are trained to be copies of one depth; where they differ the model is unsure.".into(),
-                    "Use more steps, and compare several seeds before trusting the detail.".into(),
-                ],
+                format!("The {n} channels disagree by {} (root mean square).", text_mm(apart_m)),
+                "They are trained to be copies of one depth; where they differ the model is unsure.",
+                "Use more steps, and compare several seeds before trusting the detail.",
             );
         }
     }
@@ -241,7 +235,7 @@ impl List {
                 "The decoder's picture seems to be in 0 to 1 already: correct the bundle's output range."
             }
         };
-        self.add(Severity::Wrong, FlagKind::DoubledMapping, [what, why.into(), action.into()]);
+        self.wrong(FlagKind::DoubledMapping, what, why, action);
     }
 
     fn no_spread(&mut self, chain: &DepthChain) {
@@ -249,14 +243,11 @@ impl List {
         if !stats.has_no_spread(chain.range.max_m) {
             return;
         }
-        self.add(
-            Severity::Caution,
+        self.caution(
             FlagKind::NoSpread,
-            [
-                format!("Only the mean was shifted: the predictions' deviation is {:e} m.", stats.pred_std),
-                "Dividing by a deviation of zero would send every pixel to the end of the range.".into(),
-                "Compute the statistics again over more pairs.".into(),
-            ],
+            format!("Only the mean was shifted: the predictions' deviation is {:e} m.", stats.pred_std),
+            "Dividing by a deviation of zero would send every pixel to the end of the range.",
+            "Compute the statistics again over more pairs.",
         );
     }
 
@@ -269,19 +260,16 @@ impl List {
         if count == 0 || (count as f64) < CLAMPED * of as f64 {
             return;
         }
-        self.add(
-            Severity::Caution,
+        self.caution(
             FlagKind::OutOfRange,
-            [
-                format!(
-                    "{count} of {of} pixels ({}) are outside {} to {}.",
-                    text_percent(count as f64 / of as f64),
-                    text_mm(min_m),
-                    text_mm(max_m)
-                ),
-                "The model was trained on depths inside this range: the shift carried them out of it.".into(),
-                "Choose the exact inverse, or statistics of this bundle's own predictions.".into(),
-            ],
+            format!(
+                "{count} of {of} pixels ({}) are outside {} to {}.",
+                text_percent(count as f64 / of as f64),
+                text_mm(min_m),
+                text_mm(max_m)
+            ),
+            "The model was trained on depths inside this range: the shift carried them out of it.",
+            "Choose the exact inverse, or statistics of this bundle's own predictions.",
         );
     }
 
@@ -303,41 +291,31 @@ impl List {
             format!("Prediction and truth correlate {straight:.2} as they lie, but {r:.2} with the truth {how}.")
         };
         if let (Some(r), None) = (turned, mirrored) {
-            self.add(
-                Severity::Wrong,
+            self.wrong(
                 FlagKind::TurnedBy180,
-                [
-                    seen(r, "turned by 180°"),
-                    "Bubble and GelSlim images are turned against each other by 180°; one turn is missing, or one too \
-                     many."
-                        .into(),
-                    "Correct rotation_deg of the bundle's input or output.".into(),
-                ],
+                seen(r, "turned by 180°"),
+                "Bubble and GelSlim images are turned against each other by 180°; one turn is missing, or one too \
+                     many.",
+                "Correct rotation_deg of the bundle's input or output.",
             );
         }
         if let Some(r) = mirrored {
-            self.add(
-                Severity::Wrong,
+            self.wrong(
                 FlagKind::Mirrored,
-                [
-                    seen(r, "mirrored (rows reversed)"),
-                    "The two fingers see mirror images: one finger may stand for the other.".into(),
-                    "Check which finger is which in the data and in the prediction.".into(),
-                ],
+                seen(r, "mirrored (rows reversed)"),
+                "The two fingers see mirror images: one finger may stand for the other.",
+                "Check which finger is which in the data and in the prediction.",
             );
         }
         if turned.is_none()
             && mirrored.is_none()
             && let Some(r) = as_is.filter(|r| *r < UNLIKE)
         {
-            self.add(
-                Severity::Caution,
+            self.caution(
                 FlagKind::Unlike,
-                [
-                    format!("Prediction and truth correlate only {r:.2}."),
-                    "They show different contacts: the tool may be new to the model, or the pair mismatched.".into(),
-                    "Look at the two images side by side, and try other seeds.".into(),
-                ],
+                format!("Prediction and truth correlate only {r:.2}."),
+                "They show different contacts: the tool may be new to the model, or the pair mismatched.",
+                "Look at the two images side by side, and try other seeds.",
             );
         }
     }
@@ -356,18 +334,15 @@ impl List {
             true => "Choose the exact inverse.",
             false => "A refit corrects slope and offset over a whole data set.",
         };
-        self.add(
-            Severity::Caution,
+        self.caution(
             FlagKind::Calibration,
-            [
-                format!(
-                    "The line through prediction against truth has slope {:.2}, offset {}.",
-                    line.slope,
-                    text_mm(line.offset)
-                ),
-                why.into(),
-                action.into(),
-            ],
+            format!(
+                "The line through prediction against truth has slope {:.2}, offset {}.",
+                line.slope,
+                text_mm(line.offset)
+            ),
+            why,
+            action,
         );
     }
 }

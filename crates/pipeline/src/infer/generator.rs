@@ -13,7 +13,7 @@ use super::engine::{EngineChoice, EngineError, EngineKind, Graph, Input};
 use super::kept_key::KeptKey;
 use super::sandbox::admit;
 use touch2touch_core::diffusion::{
-    Denoiser, DiffusionError, GenerateConfig, Guided, ModelError, Prediction, Progress, Tensor, sample_watched,
+    Denoiser, DiffusionError, GenerateConfig, Guided, ModelError, Prediction, Progress, Tensor, sample,
 };
 use touch2touch_core::fit::Fitted;
 use touch2touch_core::grid::{DepthMap, Grid, RgbGrid};
@@ -217,10 +217,10 @@ impl Generator {
         let mut plain = BundleDenoiser { graph: &mut self.denoiser, spec, at_once: &mut self.at_once };
         let mut watch = Watching::new(observer, &mut self.decoder, spec, items.len());
         let latent = match blank {
-            None => sample_watched(&mut plain, &spec.schedule, config, &seeds, &condition, &mut watch),
+            None => sample(&mut plain, &spec.schedule, config, &seeds, &condition, &mut watch),
             Some(blank) => {
                 let mut guided = Guided::new(&mut plain, blank, config.guidance);
-                sample_watched(&mut guided, &spec.schedule, config, &seeds, &condition, &mut watch)
+                sample(&mut guided, &spec.schedule, config, &seeds, &condition, &mut watch)
             }
         };
         let latent = latent.map_err(|err| match err {

@@ -152,13 +152,7 @@ pub struct ExportConfig {
 
 impl Default for ExportConfig {
     fn default() -> Self {
-        Self {
-            format: Format::default(),
-            seed: 0,
-            by_tool: false,
-            held_out_in_train: false,
-            rig: Rig::lab(),
-        }
+        Self { format: Format::default(), seed: 0, by_tool: false, held_out_in_train: false, rig: Rig::lab() }
     }
 }
 

@@ -1,7 +1,6 @@
 //! [`Sensors`]: imprints as other sensors would have measured the same touch.
 
 use super::MaskTouch;
-use crate::error::{Error, Result};
 use crate::random::Random;
 
 /// Ranges in which imprints are varied. What makes a pixel contact is the shape around it, not its depth: another
@@ -61,27 +60,6 @@ impl Sensors {
             shift_px: 0,
             mirrored: false,
         }
-    }
-
-    pub(super) fn check(&self) -> Result<()> {
-        let at_least_0 = [
-            ("sensors.least_m", self.least_m),
-            ("sensors.gain", self.gain),
-            ("sensors.level_m", self.level_m),
-            ("sensors.distortion_m", self.distortion_m),
-            ("sensors.grain_m", self.grain_m),
-        ];
-        for (setting, value) in at_least_0 {
-            if !(value.is_finite() && value >= 0.0) {
-                return Err(Error::Config { setting, found: value.to_string(), must: "a number of at least 0" });
-            }
-        }
-        for (setting, value) in [("sensors.shallowest", self.shallowest), ("sensors.smoothed", self.smoothed)] {
-            if !(0.0..=1.0).contains(&value) || (setting == "sensors.shallowest" && value <= 0.0) {
-                return Err(Error::Config { setting, found: value.to_string(), must: "between 0 and 1" });
-            }
-        }
-        Ok(())
     }
 
     /// A touch as another sensor would have felt it.
@@ -271,8 +249,5 @@ mod tests {
             varied.imprint_m.iter().filter(|v| !v.is_finite()).count(),
             usize::from(varied.imprint_m.iter().any(|v| v.is_nan()))
         );
-        assert!(Sensors { shallowest: 0.0, ..Sensors::default() }.check().is_err());
-        assert!(Sensors { grain_m: f64::NAN, ..Sensors::default() }.check().is_err());
-        assert!(Sensors::default().check().is_ok() && Sensors::none().check().is_ok());
     }
 }

@@ -112,8 +112,7 @@ fn what_cannot_be_learned_from_is_refused_and_says_why() {
     let mut blank = touches(1);
     blank[0].imprint_m.fill(f32::NAN);
     assert!(matches!(new(blank, config()), Err(Error::Mask { index: 0, .. })));
-    assert!(matches!(new(touches(1), MaskConfig { rate: -1.0, ..config() }), Err(Error::Config { .. })));
-    assert!(matches!(new(touches(1), MaskConfig { steps: 0, ..config() }), Err(Error::Config { .. })));
+    assert!(matches!(new(touches(1), MaskConfig { steps: 0, ..config() }), Err(Error::Start { .. })));
     let other = MaskStart { file: fixture::start().decoder, ..start() };
     assert!(matches!(MaskTuner::new(&other, touches(1), config()), Err(Error::Missing { .. })));
     let falling = MaskStart { range_m: [0.02, -0.01], ..start() };

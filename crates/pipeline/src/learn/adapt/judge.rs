@@ -3,7 +3,7 @@
 use super::adapted::Adapted;
 use super::gather::FitTouch;
 use touch2touch_core::dataset::Problem;
-use touch2touch_core::fit::sound::{self, FoundPad, Objection};
+use touch2touch_core::fit::sound::{self, FoundPad};
 use touch2touch_core::fit::{FitPair, Fitted};
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::rig::{PadId, Rig};
@@ -39,7 +39,7 @@ pub(super) fn objections(evidence: &Evidence<'_>, scores: &Adapted) -> Vec<Strin
     }
     all.extend(sound::strangers(&cases, unseen));
     let wrong = doubts.iter().map(|p| format!("{} ({})", p.what, p.hint));
-    all.iter().map(Objection::to_string).chain(wrong).collect()
+    all.into_iter().chain(wrong).collect()
 }
 
 /// Half of the width and height of a pad's color window, in pixels of a picture of this size.
