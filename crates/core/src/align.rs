@@ -416,11 +416,6 @@ impl AlignReport {
         self.runs.iter().filter(|_| self.within_prior).filter(outside).min_by(cheapest)
     }
 
-    /// True where the answer is the same with and without a proof: the ladder ended before it would ask for one.
-    pub fn needs_no_proof(&self) -> bool {
-        self.ladder.last().is_some_and(|end| end.outcome == Outcome::Accepted || end.rung < Rung::Grid)
-    }
-
     /// True where the points leave a direction of the pose open (a straight rod slides, a disc turns).
     pub fn is_degenerate(&self) -> bool {
         self.observability.is_some_and(|o| o.degenerate)

@@ -139,11 +139,6 @@ impl Registration {
     pub fn uses_field(self) -> bool {
         self != Self::LabIcp
     }
-
-    /// True where it asks for a proof where nothing else settles the pose, so that it has a provisional answer before.
-    pub fn may_prove(self) -> bool {
-        matches!(self, Self::DistanceField(_))
-    }
 }
 
 impl std::fmt::Display for Registration {

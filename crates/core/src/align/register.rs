@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::{AlignConfig, AlignError, AlignReport, Cleaned, MIN_SHARE, REACH_M, Rung, align, clean};
+use super::{AlignConfig, AlignError, AlignReport, Cleaned, MIN_SHARE, REACH_M, align, clean};
 use crate::field::DistanceField;
 use crate::frames::PlanarPose;
 use crate::grid::DepthMap;
@@ -86,8 +86,6 @@ pub struct Ask<'a> {
     pub record: bool,
     /// Gather the evidence for and against the answer.
     pub evidence: bool,
-    /// Leave the proof out, so that there is an answer at once; one that passes all tests is the same without.
-    pub provisional: bool,
 }
 
 /// A registration with its settings.
@@ -105,9 +103,6 @@ impl Register for AlignConfig {
     fn run(&self, scene: &Scene<'_>, tool: &ToolModel, ask: Ask<'_>) -> Result<AlignReport, AlignError> {
         let mut config = self.clone();
         config.record = ask.record;
-        if ask.provisional && config.rungs.iter().any(|rung| *rung != Rung::Certified) {
-            config.rungs.retain(|rung| *rung != Rung::Certified);
-        }
         if let Some(starts) = ask.starts {
             if starts.is_empty() {
                 // Without any, the ladder would choose.

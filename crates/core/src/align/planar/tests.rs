@@ -1,13 +1,10 @@
 use std::sync::OnceLock;
 
-use glam::DVec3;
 use proptest::prelude::*;
 
 use super::*;
-use crate::align::register::{Ask, Register as _, Scene};
 use crate::align::testing::{cross, cross_contacts};
 use crate::align::{Stop, TraceStep};
-use crate::tool::ToolModel;
 use crate::units::angle_error;
 
 fn field() -> &'static DistanceField {
@@ -148,20 +145,6 @@ fn every_rung_is_reached_by_the_scene_that_needs_it() {
     assert_eq!(refused.iter().map(|a| a.0).collect::<Vec<_>>(), [Single, Several, Grid, Certified]);
     assert!(refused[..3].iter().all(|a| matches!(a.1, Outcome::Cost | Outcome::OutsidePrior)), "{refused:?}");
     assert_eq!(refused[3].1, Outcome::Last);
-}
-
-#[test]
-fn a_provisional_answer_is_the_answer_unless_that_takes_a_proof() {
-    let (mesh, config) = (cross(), AlignConfig::default());
-    let tool = ToolModel::new(mesh).unwrap();
-    for (share, settled) in [(0.0, true), (0.225, true), (0.33, false)] {
-        let points: Vec<DVec3> = with_blob(share).into_iter().map(|p| DVec3::new(0.0, p.x, p.y)).collect();
-        let run = |ask| config.run(&Scene::new(&points), &tool, ask).unwrap();
-        let (provisional, whole) = (run(Ask { provisional: true, ..Ask::default() }), run(Ask::default()));
-        assert_eq!(provisional.needs_no_proof(), settled);
-        assert_eq!(provisional == whole, settled);
-        assert!(provisional.certificate.is_none() && whole.certificate.is_some() != settled);
-    }
 }
 
 #[test]
