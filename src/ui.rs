@@ -19,7 +19,7 @@ use eframe::egui_wgpu::WgpuSetup;
 
 use crate::app::services::Services;
 use crate::gpu::Gpu;
-use touch2touch_pipeline::io::caught::caught;
+use touch2touch_pipeline::io::catch_panic::catch_panic;
 use window::lost::start_again;
 
 /// Size of the window on the first start, points. eframe makes it smaller where the screen is.
@@ -59,7 +59,7 @@ pub fn run(open: Option<PathBuf>, reset: bool) -> Result<(), String> {
     let loss = options.loss.clone();
     let start: eframe::AppCreator<'_> = Box::new(move |cc| Ok(Box::new(StudioApp::new(cc, options))));
     // A frame on a device that is lost may panic.
-    let ended = caught(|| eframe::run_native("touch2touch", native, start));
+    let ended = catch_panic(|| eframe::run_native("touch2touch", native, start));
     if let Some(why) = loss.why() {
         return Err(start_again(why));
     }

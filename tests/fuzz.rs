@@ -19,7 +19,7 @@ use std::time::{Duration, Instant};
 
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
-use touch2touch_pipeline::io::caught::caught;
+use touch2touch_pipeline::io::catch_panic::catch_panic;
 
 use targets::Target;
 
@@ -162,7 +162,8 @@ fn one(folder: &Path, target: &Target, bytes: &[u8], at: &str, tally: &mut Tally
     std::fs::create_dir_all(&dir).unwrap();
     let file: PathBuf = (target.place)(&dir, bytes);
     let (before, start) = (memory::start(), Instant::now());
-    let outcome = caught(|| (target.read)(&dir, &file)).unwrap_or_else(|panic| panic!("{at}: it panicked: {panic}"));
+    let outcome =
+        catch_panic(|| (target.read)(&dir, &file)).unwrap_or_else(|panic| panic!("{at}: it panicked: {panic}"));
     let took = start.elapsed();
     let peak = memory::peak().saturating_sub(before);
     let allowed = (target.base_mib << 20) + PER_BYTE * bytes.len() as u64;

@@ -25,7 +25,7 @@ use super::state::results::Request;
 use super::state::tasks::Ticket;
 use super::state::view::UiRequest;
 use super::{demand, labels, results};
-use touch2touch_pipeline::io::caught::caught;
+use touch2touch_pipeline::io::catch_panic::catch_panic;
 use touch2touch_pipeline::job::{Cancel, Progress};
 
 /// The latest picture on the way of each touch, with the job that made it.
@@ -197,7 +197,7 @@ impl Runtime {
         }
         for effect in keep {
             if let Effect::KeepLabels { source, unsaved, folder, .. } = effect {
-                match caught(|| source.keep_labels(&unsaved, folder.as_deref())) {
+                match catch_panic(|| source.keep_labels(&unsaved, folder.as_deref())) {
                     Ok(Ok(folder)) => log::warn!("Labels that could not be saved are in {}", folder.display()),
                     Ok(Err(err)) => log::error!("{err}"),
                     Err(message) => log::error!("Keep the labels: {message}"),

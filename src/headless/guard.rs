@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use touch2touch_pipeline::io::caught::caught;
+use touch2touch_pipeline::io::catch_panic::catch_panic;
 use touch2touch_pipeline::io::files::listed;
 
 /// A panic on a pair's files.
@@ -22,7 +22,7 @@ fn names(files: &[PathBuf]) -> String {
 /// # Errors
 /// The errors of `work`, and [`Bug`] where it panics.
 pub(super) fn guarded<T>(files: Vec<PathBuf>, work: impl FnOnce() -> anyhow::Result<T>) -> anyhow::Result<T> {
-    caught(work).unwrap_or_else(|message| Err(Bug { files, message }.into()))
+    catch_panic(work).unwrap_or_else(|message| Err(Bug { files, message }.into()))
 }
 
 #[cfg(test)]

@@ -51,7 +51,7 @@ pub enum TaskErrorKind {
     Lost,
     /// It was told to stop.
     Cancelled,
-    /// A defect in this program; caught at the edge of the lane.
+    /// A defect in this program; caught at the edge of the worker.
     Panicked,
 }
 
@@ -71,7 +71,7 @@ impl TaskError {
         Self { what: what.into(), why: "cancelled".into(), hint: None, kind: TaskErrorKind::Cancelled, units: None }
     }
 
-    /// A panic caught at the edge of a lane.
+    /// A panic caught at the edge of a worker.
     pub fn panicked(what: impl Into<String>, message: &str) -> Self {
         Self {
             what: what.into(),

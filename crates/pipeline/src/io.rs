@@ -4,15 +4,15 @@
 
 pub(crate) mod archive;
 pub mod atomic;
-pub mod caught;
+pub mod catch_panic;
 pub mod dataset;
+pub mod dataset_location;
 pub mod digest;
 pub mod doctor;
 pub mod exchange;
 pub mod files;
 pub mod folders;
 pub mod fonts;
-pub mod home;
 pub mod images;
 pub mod masks;
 pub mod memory;

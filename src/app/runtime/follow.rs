@@ -11,7 +11,7 @@ use super::workers::Event;
 use super::{JobId, Runtime, Wake};
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::follow::{FollowEvent, Following};
-use touch2touch_pipeline::io::caught::caught;
+use touch2touch_pipeline::io::catch_panic::catch_panic;
 use touch2touch_pipeline::job::Cancel;
 
 /// A followed folder.
@@ -37,7 +37,7 @@ impl Runtime {
         let cancel = Cancel::default();
         let (stop, sender, wake) = (cancel.clone(), self.sender.clone(), self.wake.clone());
         let thread = std::thread::Builder::new().name("follow".into()).spawn(move || {
-            if let Err(message) = caught(|| watch(seq, &source, &stop, &sender, &wake)) {
+            if let Err(message) = catch_panic(|| watch(seq, &source, &stop, &sender, &wake)) {
                 let err = TaskError::panicked("Follow", &message);
                 drop(sender.send(Event { id: JobId::Follow, answer: Answer::JobFailed(err) }));
                 wake();

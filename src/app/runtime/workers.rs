@@ -13,7 +13,7 @@ use super::super::keys::DatasetSeq;
 use super::super::state::results::{Computed, Request};
 use super::{JobId, Wake, lock};
 use touch2touch_pipeline::error::TaskError;
-use touch2touch_pipeline::io::caught::caught;
+use touch2touch_pipeline::io::catch_panic::catch_panic;
 use touch2touch_pipeline::job::{Cancel, JobCx};
 
 /// The end of a job.
@@ -256,7 +256,7 @@ fn execute(job: Job) -> Event {
     let outcome = if cx.cancel.is_cancelled() {
         Err(TaskError::cancelled(what))
     } else {
-        match caught(|| body(&cx)) {
+        match catch_panic(|| body(&cx)) {
             Ok(outcome) => outcome,
             Err(message) => Err(TaskError::panicked(what, &message)),
         }

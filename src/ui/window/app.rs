@@ -41,7 +41,7 @@ use crate::ui::parts::theme;
 use crate::ui::parts::theme::{DARK, LIGHT};
 use touch2touch_core::rig::SensorKind;
 use touch2touch_pipeline::error::TaskError;
-use touch2touch_pipeline::io::caught::caught;
+use touch2touch_pipeline::io::catch_panic::catch_panic;
 use touch2touch_pipeline::io::fonts;
 
 /// Options that the studio is started with.
@@ -588,7 +588,7 @@ impl StudioApp {
         if std::mem::replace(&mut self.ended, true) {
             return;
         }
-        let ended = caught(|| {
+        let ended = catch_panic(|| {
             self.remember();
             let commands = std::mem::take(&mut self.inbox);
             self.runtime.tick(&mut self.state, commands);

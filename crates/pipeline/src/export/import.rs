@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use crate::error::{Remark, TaskError};
-use crate::io::caught::caught;
+use crate::io::catch_panic::catch_panic;
 use crate::io::dataset::Dataset;
 use crate::io::exchange::{self, ExportEntry, Format, Listed, ReadError, Stems};
 use crate::job::JobCx;
@@ -139,7 +139,7 @@ fn go(dataset: &Dataset, setup: &ImportSetup, write: bool, cx: &JobCx) -> Result
         let Some(entry) = dataset.index.get(pair) else { continue };
         cx.progress(done as u64, total, &entry.name);
         let job = ImportRun { dataset, labels: &labels, setup, write };
-        let one = caught(|| job.one(pair, &entry.name, &masks, &mut found));
+        let one = catch_panic(|| job.one(pair, &entry.name, &masks, &mut found));
         if let Err(err) = one.unwrap_or_else(|message| Err(TaskError::panicked(WHAT, &message))) {
             found.refused.push(Remark { name: entry.name.clone(), why: err.why });
         }

@@ -32,7 +32,7 @@ use touch2touch_core::rig::{PerPad, Rig};
 use touch2touch_core::sample::{DepthCamera, Sample};
 use touch2touch_core::turn::Turn;
 
-use super::home::Home;
+use super::dataset_location::DatasetLocation;
 use super::stl::MeshError;
 
 pub use built_in::BuiltIn;
@@ -102,7 +102,7 @@ pub struct Dataset {
     /// Root folder, the same for every sub-folder that the data set was opened from; `None` for one that is built in.
     pub root: Option<PathBuf>,
     /// That folder as it was opened.
-    pub home: Option<Home>,
+    pub home: Option<DatasetLocation>,
     /// The kind of source.
     pub kind: SourceKind,
     /// Names of all pairs in natural order.
@@ -187,7 +187,7 @@ impl Dataset {
         let title = scan.root.file_name().map_or_else(|| "dataset".into(), |n| n.to_string_lossy().into_owned());
         Self {
             title,
-            home: Home::at(&scan.root),
+            home: DatasetLocation::at(&scan.root),
             root: Some(scan.root),
             kind: scan.kind,
             index: Index { pairs: scan.pairs },
@@ -243,7 +243,7 @@ impl Dataset {
         if self.index.get(id).is_none() {
             return Err(LoadError::NoSuchPair { id });
         }
-        self.caught(id, || {
+        self.catch_panic(id, || {
             let mut loaded = match &self.source {
                 Source::Lab(lab) => lab.load(id)?,
                 Source::Depths(depths) => {
@@ -268,8 +268,8 @@ impl Dataset {
     }
 
     /// Reads something of a pair. A panic is that pair's error: no file may end a run over others.
-    fn caught<T>(&self, id: PairId, read: impl FnOnce() -> Result<T, LoadError>) -> Result<T, LoadError> {
-        super::caught::caught(read)
+    fn catch_panic<T>(&self, id: PairId, read: impl FnOnce() -> Result<T, LoadError>) -> Result<T, LoadError> {
+        super::catch_panic::catch_panic(read)
             .unwrap_or_else(|message| Err(LoadError::Bug { files: self.pair_files(id), message }))
     }
 
@@ -333,7 +333,7 @@ impl Dataset {
     /// As [`Dataset::load`].
     pub fn bubble_tile(&self, id: PairId, laid: Turn) -> Result<Option<Grid<f32>>, LoadError> {
         match &self.source {
-            Source::Pictures(pictures) => self.caught(id, || {
+            Source::Pictures(pictures) => self.catch_panic(id, || {
                 let tile = pictures.tile(id, pictures::BUBBLE, laid)?;
                 Ok(tile.map(|tile| self.lays().fold(tile, |tile, lay| lay.apply(&tile))))
             }),
@@ -348,7 +348,7 @@ impl Dataset {
     /// As [`Dataset::load`].
     pub fn vqvae_tile(&self, id: PairId, laid: Turn) -> Result<Option<Grid<f32>>, LoadError> {
         match &self.source {
-            Source::Pictures(pictures) => self.caught(id, || pictures.tile(id, pictures::VQVAE, laid)),
+            Source::Pictures(pictures) => self.catch_panic(id, || pictures.tile(id, pictures::VQVAE, laid)),
             Source::Lab(_) | Source::Depths(_) | Source::BuiltIn(_) => Ok(None),
         }
     }
@@ -359,7 +359,7 @@ impl Dataset {
     /// As [`Dataset::load`].
     pub fn gelslim_is_clipped(&self, id: PairId) -> Result<Option<bool>, LoadError> {
         match &self.source {
-            Source::Pictures(pictures) => self.caught(id, || pictures.is_clipped(id)),
+            Source::Pictures(pictures) => self.catch_panic(id, || pictures.is_clipped(id)),
             Source::Lab(_) | Source::Depths(_) | Source::BuiltIn(_) => Ok(None),
         }
     }
@@ -418,7 +418,7 @@ mod tests {
         std::fs::write(&file, b"").unwrap();
         let dataset = Dataset::open(dir.path()).unwrap();
         let error =
-            dataset.caught(PairId(0), || -> Result<(), LoadError> { panic!("the depth is {}", 3) }).unwrap_err();
+            dataset.catch_panic(PairId(0), || -> Result<(), LoadError> { panic!("the depth is {}", 3) }).unwrap_err();
         let problem = error.to_problem();
         assert!(
             problem.what.contains("a bug: the depth is 3") && problem.what.contains("a_gelslim.png"),

@@ -18,7 +18,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::dataset::Dataset;
-use super::home::{Away, Home};
+use super::dataset_location::{DatasetLocation, DatasetMoved};
 use super::predicted_id::PredictedId;
 use super::{atomic, files, folders, names};
 use touch2touch_core::dataset::Problem;
@@ -63,7 +63,7 @@ pub enum StoreError {
     },
     /// The data set is not where it was opened.
     #[error(transparent)]
-    Lost(#[from] Away),
+    Lost(#[from] DatasetMoved),
     /// No folder can be written.
     #[error("no folder for masks can be written; tried {tried}")]
     NoFolder {
@@ -85,7 +85,9 @@ impl StoreError {
 
     fn to_problem(&self) -> Problem {
         let file = match self {
-            Self::Io { file, .. } | Self::Damaged { file, .. } | Self::Lost(Away { root: file, .. }) => file.clone(),
+            Self::Io { file, .. } | Self::Damaged { file, .. } | Self::Lost(DatasetMoved { root: file, .. }) => {
+                file.clone()
+            }
             Self::NoFolder { .. } => PathBuf::new(),
         };
         Problem { file, what: self.to_string(), hint: self.hint().into() }
@@ -210,7 +212,7 @@ pub struct MaskStore {
     /// The names of the pads.
     rig: Arc<Rig>,
     /// The data set's folder, without which nothing is written: a path where another one lies, or none, is not the place.
-    home: Option<Home>,
+    home: Option<DatasetLocation>,
 }
 
 impl MaskStore {
@@ -457,7 +459,7 @@ impl MaskStore {
 
     /// Checks that the data set is still there.
     fn at_home(&self) -> Result<(), StoreError> {
-        Ok(self.home.as_ref().map_or(Ok(()), Home::check)?)
+        Ok(self.home.as_ref().map_or(Ok(()), DatasetLocation::check)?)
     }
 
     /// Makes the folder where it is missing; never the data set's own.

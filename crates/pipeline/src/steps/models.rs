@@ -14,7 +14,7 @@ use crate::infer::generator::{GenerateError, Generator, Item, Observer};
 use crate::infer::kept_key::{KeptKey, input_digest};
 use crate::infer::mask::{ImprintError, MaskModel};
 use crate::infer::store::Store;
-use crate::io::caught::caught;
+use crate::io::catch_panic::catch_panic;
 use crate::job::{JobCx, PreviewPicture};
 use crate::steps::bundles::{BundleInfo, BundleKind, by_id};
 use crate::steps::imprint::in_meters;
@@ -206,7 +206,7 @@ impl Models {
         let what = || format!("Generate with {}", bundle.name);
         let run = |wanted: &[GenerateInput<'_>]| {
             let predict = || self.predict(bundle, engine, config, wanted, cx);
-            caught(predict).unwrap_or_else(|message| Err(TaskError::panicked(what(), &message)))
+            catch_panic(predict).unwrap_or_else(|message| Err(TaskError::panicked(what(), &message)))
         };
         let one = |wanted: &GenerateInput<'_>| {
             let made = run(std::slice::from_ref(wanted))?.pop();

@@ -23,7 +23,7 @@ use super::lab::NO_TOUCH;
 use super::rig_json::{RIG_JSON, rig_of};
 use super::{InvalidPixels, LoadError, Loaded, OpenError, Scan, Source, SourceKind};
 use super::{most_invalid, plausible, problem, same_name};
-use crate::io::caught::caught;
+use crate::io::catch_panic::catch_panic;
 use crate::io::files;
 use crate::io::names::is_output;
 use crate::io::pt::{PtDict, PtError, read_dict};
@@ -153,13 +153,13 @@ impl Found {
         });
         paths.sort();
         // The first file that can be read and is of either kind says what kind of folder it is.
-        let opened = || paths.iter().take(MOST_TRIED).filter_map(|path| caught(|| read_dict(path)).ok()?.ok());
+        let opened = || paths.iter().take(MOST_TRIED).filter_map(|path| catch_panic(|| read_dict(path)).ok()?.ok());
         if !opened().find(|rows| rows.has(TOUCHED) || rows.has("gelslim")).is_some_and(|rows| rows.has(TOUCHED)) {
             return;
         }
         self.folders.push(folder.to_owned());
         for path in paths {
-            let read = caught(|| Ok(touches(&read_dict(&path)?)?));
+            let read = catch_panic(|| Ok(touches(&read_dict(&path)?)?));
             let failed = |message| Err(LoadError::Bug { files: vec![path.clone()], message });
             match read.unwrap_or_else(failed) {
                 Ok(touches) => self.add(path, touches),

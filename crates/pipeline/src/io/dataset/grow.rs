@@ -8,7 +8,7 @@ use std::sync::{Arc, OnceLock};
 use super::depths;
 use super::lab::{self, FileRef, Lab};
 use super::{Dataset, LoadError, OpenError, RIG_JSON, SAME_NAME, Scan, Source, SourceKind, pictures, problem};
-use crate::io::caught::caught;
+use crate::io::catch_panic::catch_panic;
 use touch2touch_core::dataset::{PairId, Problem};
 use touch2touch_core::rig::PerPad;
 use touch2touch_core::sample::{DepthCamera, Sample};
@@ -181,7 +181,7 @@ impl Dataset {
 
 /// The cameras in a bubble file of the lab's; one without camera data has none.
 fn cameras_of(file: &Path) -> Result<PerPad<DepthCamera>, LoadError> {
-    caught(|| Lab::cameras(file))
+    catch_panic(|| Lab::cameras(file))
         .unwrap_or_else(|message| Err(LoadError::Bug { files: vec![file.to_owned()], message }))
 }
 

@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-use crate::io::caught::caught;
+use crate::io::catch_panic::catch_panic;
 use crate::io::names::is_output;
 use crate::io::pt::read_dict;
 use touch2touch_core::dataset::{PairEntry, PairId, Problem, Split};
@@ -161,7 +161,7 @@ pub(super) fn scan_flat(folder: &Path) -> Option<Scan> {
     let files = lab.pairs.iter().filter_map(|pair| pair.gelslim.as_ref());
     // What cannot be read, or makes the reader fail, may be a touch that is still being written.
     let is_touch = |file: &FileRef| {
-        let read = caught(|| read_dict(&lab.path(file)));
+        let read = catch_panic(|| read_dict(&lab.path(file)));
         read.map_or(true, |read| read.map_or(true, |dict| dict.has("gelslim")))
     };
     files.take(MOST_TRIED).any(is_touch).then_some(scan)

@@ -11,7 +11,7 @@ use super::{Setup, Skipped, ToolWork};
 use crate::compare::as_tile;
 use crate::error::TaskError;
 use crate::infer::classifier::ToolClassifier;
-use crate::io::caught::caught;
+use crate::io::catch_panic::catch_panic;
 use crate::io::dataset::Dataset;
 use crate::job::JobCx;
 use crate::labels::PairLabels;
@@ -373,7 +373,7 @@ fn images(case: &LoadedPair, made: &Made, setup: &Setup, upper: bool) -> Vec<Ima
 
 /// The work on one pair: a panic in it is that pair's failure and not the end of the run.
 fn guarded<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
-    caught(work).unwrap_or_else(|message| {
+    catch_panic(work).unwrap_or_else(|message| {
         Err(format!("an internal error, which is a bug: {message}; please report it with this pair"))
     })
 }

@@ -1,4 +1,4 @@
-//! [`Home`]: the folder of a data set as it was opened.
+//! [`DatasetLocation`]: the folder of a data set as it was opened.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -8,7 +8,7 @@ use super::files::Identity;
 /// A folder that is remembered by what it is and not by its path alone: while a data set is open its folder may be renamed,
 /// deleted or replaced, and what is written to the old path would be of nothing.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Home {
+pub struct DatasetLocation {
     root: PathBuf,
     identity: Identity,
 }
@@ -16,13 +16,13 @@ pub struct Home {
 /// A data set is not where it was opened.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the data set is not where it was opened: {} {how}", root.display())]
-pub struct Away {
+pub struct DatasetMoved {
     /// Folder of the data set, as it was opened.
     pub root: PathBuf,
     how: String,
 }
 
-impl Home {
+impl DatasetLocation {
     /// The folder that lies at a path now; `None` where there is none.
     pub fn at(root: &Path) -> Option<Self> {
         let found = std::fs::metadata(root).ok().filter(std::fs::Metadata::is_dir)?;
@@ -42,9 +42,9 @@ impl Home {
     /// Checks that the folder is still there.
     ///
     /// # Errors
-    /// [`Away`], also where the system does not say.
-    pub fn check(&self) -> Result<(), Away> {
-        let away = |how: String| Err(Away { root: self.root.clone(), how });
+    /// [`DatasetMoved`], also where the system does not say.
+    pub fn check(&self) -> Result<(), DatasetMoved> {
+        let away = |how: String| Err(DatasetMoved { root: self.root.clone(), how });
         match std::fs::metadata(&self.root) {
             Ok(found) if Identity::of(&found) == self.identity => Ok(()),
             Ok(_) => away("is another folder now".into()),
@@ -62,9 +62,9 @@ mod tests {
     fn a_folder_is_the_same_only_where_it_was_and_as_it_was() {
         let dir = tempfile::tempdir().unwrap();
         let (root, elsewhere) = (dir.path().join("data"), dir.path().join("renamed"));
-        assert_eq!(Home::at(&root), None);
+        assert_eq!(DatasetLocation::at(&root), None);
         std::fs::create_dir(&root).unwrap();
-        let home = Home::at(&root).unwrap();
+        let home = DatasetLocation::at(&root).unwrap();
         std::fs::write(root.join("new"), "1").unwrap();
         assert_eq!(home.check(), Ok(()), "what lies in it may change");
         std::fs::rename(&root, &elsewhere).unwrap();
