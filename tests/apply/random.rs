@@ -99,7 +99,7 @@ fn cases(few: u32) -> ProptestConfig {
 
 proptest! {
     // Each case runs its jobs for real.
-    #![proptest_config(cases(24))]
+    #![proptest_config(cases(6))]
 
     #[test]
     fn undoing_everything_brings_the_document_back(
@@ -145,7 +145,7 @@ proptest! {
 
 proptest! {
     // A simulated grasp registers for real: these take seconds.
-    #![proptest_config(cases(6))]
+    #![proptest_config(cases(4))]
 
     #[test]
     fn no_order_of_commands_panics(commands in session(command(), 40)) {
