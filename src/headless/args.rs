@@ -10,6 +10,7 @@ use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use strum::IntoEnumIterator;
 
+use touch2touch_core::align::Range;
 use touch2touch_core::pose::Registration;
 use touch2touch_core::rig::{PadId, Rig};
 use touch2touch_pipeline::io::dataset::Dataset;
@@ -89,6 +90,10 @@ pub(super) struct RegistrationArgs {
     /// The registration. `distance_field` may be followed by `:gate=MM`, beyond which points are ignored.
     #[arg(long = "engine", value_name = "ENGINE", default_value = Registration::default().key(), value_parser = registrations())]
     chosen: Registrations,
+    /// Poses of the tool in the hand among which `joint` looks for it: up to so many degrees and millimeters from 0, or `free`
+    /// (default: 22.5,5, the lab's grasps).
+    #[arg(long, value_name = "DEG,MM")]
+    range: Option<Range>,
 }
 
 #[derive(Debug, Clone)]
@@ -111,14 +116,18 @@ fn registrations() -> Listed<Registrations> {
 
 impl RegistrationArgs {
     /// All of them, in this order.
-    pub(super) fn all(&self) -> &[Registration] {
-        &self.chosen.0
+    pub(super) fn all(&self) -> anyhow::Result<Vec<Registration>> {
+        let Some(range) = self.range else { return Ok(self.chosen.0.clone()) };
+        if let [by] = self.chosen.0[..] {
+            return Ok(vec![by.with_range(range).map_err(anyhow::Error::msg)?]);
+        }
+        Ok(self.chosen.0.iter().map(|by| by.with_range(range).unwrap_or(*by)).collect())
     }
 
     /// The only one.
     pub(super) fn one(&self) -> anyhow::Result<Registration> {
-        match self.all() {
-            [registration] => Ok(*registration),
+        match self.all()?[..] {
+            [registration] => Ok(registration),
             _ => anyhow::bail!("--engine all is for `touch2touch pose`; one registration is needed here"),
         }
     }

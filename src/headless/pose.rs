@@ -29,7 +29,7 @@ use touch2touch_pipeline::steps::tool::load_tool;
 
 use args::Imprints;
 pub(super) use args::{PoseArgs, parse_start};
-use report::{Accepted, First, PoseRow, RankedTool, Report, summary, text};
+use report::{Accepted, AnswerRow, First, PoseRow, RankedTool, Report, summary, text};
 
 /// Word of `--tool` for trying all tools.
 const ANY: &str = "any";
@@ -129,7 +129,7 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
     }
     complete &= !cases.is_empty();
     let notes = notes.into_list(&output);
-    let of = First { registration: args.registration.all()[0].to_string(), imprint: imprints[0].key().to_owned() };
+    let of = First { registration: args.registration.all()?[0].to_string(), imprint: imprints[0].key().to_owned() };
     let report = Report { summary: summary(&cases, of), cases, notes };
     output.finish(&report, || text(&report))?;
     Ok(complete)
@@ -188,6 +188,7 @@ fn pose_cases(args: &PoseArgs, asked: &PairInput<'_>, models: &Models) -> anyhow
             angle_sd_deg: answer.and_then(|found| Some(found.angle_sd_rad()?.to_degrees())),
             verdict: answer.and_then(|found| found.verdict.clone()),
             evidence: answer.and_then(|found| found.report.evidence),
+            answers: answer.iter().flat_map(|found| &found.report.answers).map(AnswerRow::new).collect(),
             stop: found.as_ref().map_or_else(|err| err.why.clone(), |found| found.stop.clone()),
             accepted: accepted.map(|a| Accepted::new(a, truth.map(|truth| truth.inverse().theta_rad))),
             // The evidence stands beside it.
@@ -195,5 +196,5 @@ fn pose_cases(args: &PoseArgs, asked: &PairInput<'_>, models: &Models) -> anyhow
             ambiguity: left_open.clone(),
         })
     };
-    args.registration.all().iter().map(one).collect()
+    args.registration.all()?.iter().map(one).collect()
 }

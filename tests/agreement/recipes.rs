@@ -235,7 +235,7 @@ fn ids_stay_what_they_are() {
     let ids = |recipe: &Recipe| Stage::iter().map(|stage| recipe.id(stage).to_string()).collect::<Vec<_>>();
     let by_mask = Recipe { registration: Registration::DistanceField(None), ..Recipe::default() };
     assert_eq!(ids(&by_mask), vec!["r1-44136fa355b3678a"; 5], "nothing is named");
-    let joint = Recipe { registration: Registration::Joint, ..Recipe::default() };
+    let joint = Recipe { registration: Registration::default(), ..Recipe::default() };
     assert_eq!(ids(&joint)[..4], ids(&by_mask)[..4]);
     assert_eq!(ids(&joint)[4], "r1-b35d14d5984e1aad");
     let hand = Recipe { hand: false, ..by_mask.clone() };

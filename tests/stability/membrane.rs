@@ -16,7 +16,7 @@ use super::{case, lifted, suite};
 fn registered(points: &[DVec3], imprints: &[DepthMap; 2], predicted: bool) -> AlignReport {
     let (case, model) = case();
     let image = |f: usize| PadImage { imprint: &imprints[f], camera: &case.cameras[f], predicted };
-    register(Contacts { points, images: &[image(0), image(1)] }, model, Registration::Joint, false).unwrap()
+    register(Contacts { points, images: &[image(0), image(1)] }, model, Registration::default(), false).unwrap()
 }
 
 fn points(imprints: &[DepthMap; 2], masks: &[Mask; 2]) -> Vec<DVec3> {

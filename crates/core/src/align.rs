@@ -35,7 +35,7 @@ use serde::{Deserialize, Serialize};
 
 use super::frames::PlanarPose;
 
-pub use joint::{Basis, Elsewhere, Evidence, JointConfig, JointFit, MaskWeight, MembraneEvidence};
+pub use joint::{Basis, Elsewhere, Evidence, JointConfig, JointFit, MaskWeight, MembraneEvidence, PoseAnswer};
 pub use lab_icp::{LabIcpConfig, LabModel, PaperTrap, lab_icp, lab_starts};
 pub(crate) use observability::DEGENERATE_BELOW;
 pub use observability::{Observability, observability};
@@ -161,6 +161,68 @@ impl Prior {
     }
 }
 
+/// Poses among which a tool is looked for, as a [`Prior`] of whole numbers: the same in a key, in a text and in the arithmetic.
+/// As text `DEGREES,MM`. No smaller than the default, which is the prior of all registrations.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct Range {
+    millidegrees: u32,
+    micrometers: u32,
+}
+
+impl Default for Range {
+    /// The grid of the lab's grasps.
+    fn default() -> Self {
+        Self { millidegrees: 22_500, micrometers: 5_000 }
+    }
+}
+
+impl Range {
+    /// A full turn, and farther than any tool reaches.
+    pub const FREE: Self = Self { millidegrees: 180_000, micrometers: 1_000_000 };
+
+    /// The box that it is.
+    pub fn prior(self) -> Prior {
+        let [degrees, shift_mm] = self.lengths();
+        Prior { theta_rad: degrees.to_radians(), shift_m: shift_mm / 1e3 }
+    }
+
+    /// Degrees and millimeters.
+    pub fn lengths(self) -> [f64; 2] {
+        [self.millidegrees, self.micrometers].map(|part| f64::from(part) / 1e3)
+    }
+}
+
+impl std::fmt::Display for Range {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let [degrees, shift_mm] = self.lengths();
+        write!(f, "{degrees},{shift_mm}")
+    }
+}
+
+impl std::str::FromStr for Range {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "free" {
+            return Ok(Self::FREE);
+        }
+        let ([least_deg, least_mm], [most_deg, most_mm]) = (Self::default().lengths(), Self::FREE.lengths());
+        let number = |text: &str, within: std::ops::RangeInclusive<f64>| {
+            let value = text.trim().parse().ok().filter(|value| within.contains(value));
+            value.map(|value: f64| (value * 1e3).round() as u32)
+        };
+        let parts = text
+            .split_once(',')
+            .and_then(|(turn, shift)| Some((number(turn, least_deg..=most_deg)?, number(shift, least_mm..=most_mm)?)));
+        let (millidegrees, micrometers) = parts.ok_or_else(|| {
+            format!(
+                "{text:?}: `free`, or {least_deg} to {most_deg} degrees and {least_mm} to {most_mm} mm are needed, as in 180,40"
+            )
+        })?;
+        Ok(Self { millidegrees, micrometers })
+    }
+}
+
 /// Why there is no pose.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum AlignError {
@@ -258,6 +320,9 @@ pub enum Rung {
     /// A start at every knot of a grid over the prior.
     #[strum(to_string = "grid")]
     Grid,
+    /// Scouts over the full turn and all of the model.
+    #[strum(to_string = "full turn")]
+    Around,
     /// Branch and bound over the prior: nothing in it is better by more than the gap.
     #[strum(to_string = "certified search")]
     Certified,
@@ -395,6 +460,15 @@ pub struct AlignReport {
     /// Evidence for and against the answer, where it was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub evidence: Option<Evidence>,
+    /// Poses that the touch allows, with their chances, the answer first; where the evidence was asked for and the range is wide.
+    #[serde(skip)]
+    pub answers: Vec<PoseAnswer>,
+    /// Poses that came near to being the answer, and it, with costs to compare; none where the first one stood.
+    #[serde(skip)]
+    pub ends: Vec<(PlanarPose, f64)>,
+    /// Poses among which it looked.
+    #[serde(skip)]
+    pub range: Range,
     /// Per-iteration states of all runs; empty unless recorded.
     pub trace: Vec<TraceStep>,
     /// Fate of every offered point, in order; empty unless recorded.
@@ -411,7 +485,7 @@ impl AlignReport {
     /// is possible. `None` where the answer is the cheapest.
     pub fn refused(&self) -> Option<&Run> {
         let won = self.runs.get(self.winner)?.cost_m2;
-        let outside = |run: &&Run| run.cost_m2 < won && !Prior::default().allows(run.end);
+        let outside = |run: &&Run| run.cost_m2 < won && !self.range.prior().allows(run.end);
         let cheapest = |a: &&Run, b: &&Run| a.cost_m2.total_cmp(&b.cost_m2);
         self.runs.iter().filter(|_| self.within_prior).filter(outside).min_by(cheapest)
     }

@@ -41,6 +41,7 @@ pub mod rig;
 pub mod sample;
 pub mod sensor;
 pub mod sim;
+pub mod symmetry;
 mod tent;
 pub mod text;
 pub mod tool;

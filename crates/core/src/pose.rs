@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use strum::IntoEnumIterator as _;
 
 use super::align::{
-    AlignConfig, AlignError, AlignReport, Ask, Contacts, Evidence, JointConfig, LabIcpConfig, Register, Scene,
+    AlignConfig, AlignError, AlignReport, Ask, Contacts, Evidence, JointConfig, LabIcpConfig, Range, Register, Scene,
 };
 
 pub use super::tool::{ToolError, ToolModel};
@@ -44,13 +44,12 @@ impl Gate {
     }
 }
 
-/// Registration that answers. As text its key, with `:gate=MM` behind it where another gate was chosen: `joint`,
+/// Registration that answers. As text its key, with `:gate=MM` behind it where another gate was chosen: `joint`, `joint:range=180,40`,
 /// `distance_field:gate=1.5`.
 #[derive(
     Clone,
     Copy,
     Debug,
-    Default,
     PartialEq,
     Eq,
     PartialOrd,
@@ -64,13 +63,18 @@ impl Gate {
 #[serde(try_from = "String", into = "String")]
 #[strum(serialize_all = "snake_case")]
 pub enum Registration {
-    /// The membranes' images against the tent over the tool, and the mask.
-    #[default]
-    Joint,
+    /// The membranes' images against the tent over the tool, and the mask; among these poses.
+    Joint(Range),
     /// Robust registration on the distance field of the tool's silhouette, with another gate than its own where one is named.
     DistanceField(Option<Gate>),
     /// The lab's planar point-to-point loop.
     LabIcp,
+}
+
+impl Default for Registration {
+    fn default() -> Self {
+        Self::Joint(Range::default())
+    }
 }
 
 impl Registration {
@@ -79,10 +83,11 @@ impl Registration {
         self.into()
     }
 
-    /// Name for people, with the gate that was chosen.
+    /// Name for people, with the gate or the range that was chosen.
     pub fn label(self) -> String {
         match self {
-            Self::Joint => "Joint (membrane and mask)".to_owned(),
+            Self::Joint(range) if range == Range::default() => "Joint (membrane and mask)".to_owned(),
+            Self::Joint(range) => format!("Joint (membrane and mask), range {range}"),
             Self::DistanceField(None) => "ICP (distance field)".to_owned(),
             Self::DistanceField(Some(gate)) => format!("ICP (distance field), gate {} mm", gate.millimeters()),
             Self::LabIcp => "ICP (paper)".to_owned(),
@@ -93,7 +98,7 @@ impl Registration {
     pub fn description(self) -> &'static str {
         match self {
             Self::DistanceField(_) => "The mask alone: robust least squares on the distance field of the silhouette",
-            Self::Joint => {
+            Self::Joint(_) => {
                 "The default: the whole membrane against the sheet that the tool would lift, with the mask as a weaker term"
             }
             Self::LabIcp => "The paper's loop: planar point to point, one start, up to 200 iterations, no rejection",
@@ -119,10 +124,21 @@ impl Registration {
         }
     }
 
+    /// The registration among more poses.
+    ///
+    /// # Errors
+    /// If it has no range.
+    pub fn with_range(self, range: Range) -> Result<Self, String> {
+        match self {
+            Self::Joint(_) => Ok(Self::Joint(range)),
+            _ => Err(format!("{} has no range; one that has is {}", self.label(), Self::default().key())),
+        }
+    }
+
     /// The registration with the settings that the product uses, apart from the gate.
     pub fn method(self) -> Box<dyn Register> {
         match self {
-            Self::Joint => Box::new(JointConfig::default()),
+            Self::Joint(range) => Box::new(JointConfig { range, ..JointConfig::default() }),
             Self::DistanceField(gate) => {
                 let mut config = AlignConfig::default();
                 if let Some(gate) = gate {
@@ -146,6 +162,7 @@ impl std::fmt::Display for Registration {
         f.write_str(self.key())?;
         match self {
             Self::DistanceField(Some(gate)) => write!(f, ":gate={}", gate.millimeters()),
+            Self::Joint(range) if *range != Range::default() => write!(f, ":range={range}"),
             _ => Ok(()),
         }
     }
@@ -161,8 +178,12 @@ impl FromStr for Registration {
             format!("{key:?} is no registration; there are {}", keys.join(", "))
         })?;
         let Some(rest) = rest else { return Ok(by) };
+        if let Some(range) = rest.strip_prefix("range=") {
+            return by.with_range(range.parse()?);
+        }
         let mm = rest.strip_prefix("gate=");
-        let mm = mm.ok_or_else(|| format!("{text:?}: a registration is followed by nothing or :gate=MM"))?;
+        let mm =
+            mm.ok_or_else(|| format!("{text:?}: a registration is followed by nothing, :gate=MM or :range=DEG,MM"))?;
         let mm: f64 = mm.parse().map_err(|_| format!("{mm:?} is not a number"))?;
         by.with_gate(Gate::new(mm / 1e3)?)
     }
@@ -209,7 +230,7 @@ pub fn register_with<'a>(
     let scene = Scene::new(contacts);
     let mut report = registration.run(&scene, tool, ask)?;
     if ask.evidence {
-        report.evidence = Some(Evidence::about(&scene, tool, &report));
+        Evidence::gather(&scene, tool, &mut report);
     }
     Ok(report)
 }
@@ -223,7 +244,8 @@ mod tests {
     #[test]
     fn what_is_written_is_read_and_what_cannot_be_done_is_refused() {
         let gated = Registration::DistanceField(Some(Gate::new(0.0003).unwrap()));
-        for by in Registration::iter().chain([gated]) {
+        let ranged = Registration::default().with_range("180,40".parse().unwrap()).unwrap();
+        for by in Registration::iter().chain([gated, ranged]) {
             assert_eq!(by.to_string().parse(), Ok(by));
             let json = serde_json::to_string(&by).unwrap();
             assert_eq!(serde_json::from_str::<Registration>(&json).unwrap(), by);
@@ -236,6 +258,9 @@ mod tests {
             ("distance_field:gate=", "not a number"),
             ("distance_field:keep=3", "followed by"),
             ("lab_icp:gate=1", "has no gate"),
+            ("lab_icp:range=90,10", "has no range"),
+            ("joint:range=200,10", "to 180 degrees"),
+            ("joint:range=10,10", "22.5 to"),
         ] {
             let why = text.parse::<Registration>().unwrap_err();
             assert!(why.contains(word), "{text}: {why}");

@@ -13,6 +13,7 @@
 
 use glam::{DVec2, DVec3};
 
+use crate::frames::PlanarPose;
 use crate::mesh::TriMesh;
 use crate::relax::{Field, Problem};
 
@@ -34,13 +35,22 @@ const STEEPEST: f32 = 1.6;
 /// Bending of the membrane during a touch over that of the free one: the pressure rises.
 const PRESSED: f64 = 1.15;
 
-/// Heights over the middle plane, meters, on a grid of [`STEP_M`].
+/// Heights over the middle plane, meters, on a grid.
 #[derive(Clone, Debug)]
 pub(crate) struct Sheet {
     /// Row by row: y runs along a row, z over the rows.
     pub(crate) field: Field,
     /// `(y, z)` of node (0, 0), object frame, meters.
     pub(crate) origin: DVec2,
+    /// Spacing of the nodes, meters.
+    pub(crate) step_m: f64,
+}
+
+impl Sheet {
+    /// Every second node.
+    pub(crate) fn thinned(&self) -> Self {
+        Self { field: self.field.thinned(), step_m: 2.0 * self.step_m, ..*self }
+    }
 }
 
 /// The top of a tool on the side of the middle plane where x has the sign of `side`, meters; 0 beside it and where it lies
@@ -73,7 +83,7 @@ pub(crate) fn heights(mesh: &TriMesh, side: f64) -> Option<Sheet> {
         let corner = triangle.map(|c| ((DVec2::new(c.y, c.z) - origin) / STEP_M, side.signum() * c.x));
         raise(&mut field, corner);
     }
-    Some(Sheet { field, origin })
+    Some(Sheet { field, origin, step_m: STEP_M })
 }
 
 /// Raises the nodes under a triangle, whose corners are given as (place in nodes, height).
@@ -114,10 +124,14 @@ pub(crate) struct FreeShape {
     pub(crate) bend: DVec2,
     /// True where it reaches the middle plane.
     pub(crate) reaches: bool,
+    /// The pose of the tool under it, `grasp_from_object`.
+    pub(crate) of: PlanarPose,
 }
 
 impl FreeShape {
+    /// Height over the middle plane at a place of the object frame, meters.
     fn at(&self, yz: DVec2) -> f64 {
+        let yz = self.of.transform_yz(yz);
         self.height_m + self.slope.dot(yz) + 0.5 * self.bend.dot(yz * yz)
     }
 }
@@ -130,21 +144,22 @@ pub(crate) fn lifted(heights: &Sheet, free: &FreeShape) -> Sheet {
 
 fn lifted_by(heights: &Sheet, free: &FreeShape, solve: impl FnOnce(&Problem<'_>) -> Field) -> Sheet {
     let (columns, rows) = (heights.field.columns, heights.field.rows);
-    let place = |k: usize| heights.origin + DVec2::new((k % columns) as f64, (k / columns) as f64) * STEP_M;
+    let place = |k: usize| heights.origin + DVec2::new((k % columns) as f64, (k / columns) as f64) * heights.step_m;
     let dome: Vec<f32> = (0..columns * rows).map(|k| free.at(place(k)) as f32).collect();
-    let within: Vec<bool> = (0..columns * rows).map(|k| place(k).length() < RIM_M).collect();
+    let within: Vec<bool> = (0..columns * rows).map(|k| free.of.transform_yz(place(k)).length() < RIM_M).collect();
     let mut obstacle = Field::filled(columns, rows, f32::NEG_INFINITY);
     for k in (0..columns * rows).filter(|k| within[*k]) {
         obstacle.values[k] = heights.field.values[k] - dome[k];
     }
     // About the free membrane the sheet bends by the rest.
     let load = ((1.0 - PRESSED) * (free.bend.x + free.bend.y)) as f32;
-    let problem = Problem { obstacle: &obstacle, free: &within, load, more: None, stiffness: 0.0, step: STEP_M as f32 };
+    let problem =
+        Problem { obstacle: &obstacle, free: &within, load, more: None, stiffness: 0.0, step: heights.step_m as f32 };
     let mut field = solve(&problem);
     for (k, lifted) in field.values.iter_mut().enumerate() {
         *lifted = if within[k] { *lifted + dome[k].min(0.0) } else { 0.0 };
     }
-    Sheet { field, origin: heights.origin }
+    Sheet { field, ..*heights }
 }
 
 /// The smallest sheet over `heights` that touches the middle plane elsewhere and bends by at most `curvature` (the
@@ -162,7 +177,7 @@ pub(crate) fn tent(heights: &Sheet, curvature: f64) -> Sheet {
         let bent = Problem { more: Some(&more), ..plain };
         bent.relax(&mut field, SWEEPS);
     }
-    Sheet { field, origin: heights.origin }
+    Sheet { field, ..*heights }
 }
 
 /// Addition of a sheet's slopes to its load.
@@ -186,10 +201,23 @@ mod tests {
     use super::*;
     use crate::align::testing::cuboid;
 
+    const HERE: PlanarPose = PlanarPose { theta_rad: 0.0, y_m: 0.0, z_m: 0.0 };
     /// A membrane like the first simulator's, which reaches the middle plane, and one like the lab's, which does not.
     const SHAPES: [FreeShape; 2] = [
-        FreeShape { height_m: -0.7e-3, slope: DVec2::new(0.0, -0.04), bend: DVec2::new(14.0, 7.0), reaches: true },
-        FreeShape { height_m: 7e-3, slope: DVec2::new(0.0, 0.17), bend: DVec2::new(18.0, 12.0), reaches: false },
+        FreeShape {
+            height_m: -0.7e-3,
+            slope: DVec2::new(0.0, -0.04),
+            bend: DVec2::new(14.0, 7.0),
+            reaches: true,
+            of: HERE,
+        },
+        FreeShape {
+            height_m: 7e-3,
+            slope: DVec2::new(0.0, 0.17),
+            bend: DVec2::new(18.0, 12.0),
+            reaches: false,
+            of: HERE,
+        },
     ];
 
     #[test]

@@ -3,7 +3,7 @@
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-use crate::align::{self, AlignReport, Basis, Evidence, PLACE_OPEN_M};
+use crate::align::{self, AlignReport, Basis, Evidence, PLACE_OPEN_M, Range};
 use crate::manual::PoseDifference;
 use crate::units;
 
@@ -108,6 +108,11 @@ const OFF: Limits = [0.5, f64::INFINITY];
 /// Standard deviation of the place where it is known least, meters.
 const PLACE_SD_M: Limits = [PLACE_OPEN_M, f64::INFINITY];
 
+/// Signs of another tool, or of a touch that is none of this one, that together say what the range does not where it is wide.
+const TOGETHER: usize = 3;
+/// Chance of the answer below which another one is told.
+const LIKELIEST: f64 = 0.5;
+
 /// Verdict on a pose: all that speaks against it, without the truth.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Verdict {
@@ -125,6 +130,8 @@ pub struct Verdict {
 pub enum SignKind {
     /// The gripper cannot hold it so.
     NotHeld,
+    /// Another pose is likelier.
+    Several,
     /// The imprints fit better with the fingers swapped.
     Swapped,
     /// The fingers have it at different places.
@@ -173,6 +180,16 @@ impl Verdict {
     fn with_place(report: &AlignReport, evidence: &Evidence, place_m: f64) -> Self {
         let mut against = signs(report, evidence, place_m);
         against.retain(|sign| sign.grade > Grade::Good);
+        let unlike = |sign: &&Sign| {
+            use SignKind::{Elsewhere, Fingers, Misfit, OffTool, Swapped};
+            matches!(sign.kind, Elsewhere | Fingers | Misfit | OffTool | Swapped)
+        };
+        if report.range != Range::default()
+            && against.iter().filter(unlike).count() >= TOGETHER
+            && let Some(misfit) = against.iter_mut().find(|sign| sign.kind == SignKind::Misfit)
+        {
+            misfit.grade = Grade::Wrong;
+        }
         against.sort_by_key(|sign| std::cmp::Reverse(sign.grade));
         let (grade, why) = match against.first() {
             Some(sign) => (sign.grade, sign.what.clone()),
@@ -192,11 +209,18 @@ fn fits(evidence: &Evidence) -> String {
 }
 
 fn signs(report: &AlignReport, evidence: &Evidence, place_m: f64) -> Vec<Sign> {
-    use SignKind::{AngleOpen, Elsewhere, Fingers, MaskAlone, Misfit, NotHeld, OffTool, PlaceOpen, Swapped};
+    use SignKind::{AngleOpen, Elsewhere, Fingers, MaskAlone, Misfit, NotHeld, OffTool, PlaceOpen, Several, Swapped};
     let mut signs = Vec::new();
     let mut sign = |kind, grade, what| signs.push(Sign { kind, grade, what });
     if !report.within_prior {
-        sign(NotHeld, Grade::Wrong, "the gripper cannot hold it so (±22.5°, ±5 mm)".to_owned());
+        let [degrees, shift_mm] = report.range.lengths();
+        sign(NotHeld, Grade::Wrong, format!("the gripper cannot hold it so (±{degrees}°, ±{shift_mm} mm)"));
+    }
+    let own: f64 = report.answers.iter().filter(|answer| answer.alike).map(|answer| answer.weight).sum();
+    if let Some(other) = report.answers.iter().find(|answer| !answer.alike).filter(|_| own < LIKELIEST) {
+        let off = PoseDifference::between(report.grasp_from_object, other.grasp_from_object);
+        let (turned, moved) = (units::text_deg(off.angle_rad), units::text_mm(off.position_m));
+        sign(Several, Grade::Check, format!("another pose fits as well: {turned} and {moved} from here"));
     }
     let off = 1.0 - evidence.on_tool;
     let percent = |share: f64| format!("{:.0} %", 100.0 * share);

@@ -73,6 +73,6 @@ impl PoseArgs {
             Imprints::Measured => ImprintSource::Measured,
             Imprints::Predicted | Imprints::Both => ImprintSource::Predicted,
         };
-        self.model.posed(imprint, rig, &self.mask, self.registration.all()[0])
+        self.model.posed(imprint, rig, &self.mask, self.registration.all()?[0])
     }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use touch2touch_core::align::{AlignReport, Evidence};
+use touch2touch_core::align::{AlignReport, Evidence, PoseAnswer};
 use touch2touch_core::ambiguity::Ambiguity;
 use touch2touch_core::findings::Finding;
 use touch2touch_core::frames::PlanarPose;
@@ -37,6 +37,9 @@ pub(super) struct PoseRow {
     /// Evidence that the verdict is from, with the covariance of the pose.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) evidence: Option<Evidence>,
+    /// Poses that the touch allows, the answer first, where the range is wide.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) answers: Vec<AnswerRow>,
     pub(super) truth_deg: Option<f64>,
     pub(super) error_deg: Option<f64>,
     pub(super) y_m: Option<f64>,
@@ -52,6 +55,23 @@ pub(super) struct PoseRow {
     /// Of a predicted imprint: what the GelSlim images (right, left) leave open about where on the tool they are.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) ambiguity: Option<PerPad<Ambiguity>>,
+}
+
+/// A pose that the touch allows, in the sense of the other numbers of a [`PoseRow`].
+#[derive(Debug, Clone, Copy, Serialize)]
+pub(super) struct AnswerRow {
+    pub(super) angle_deg: f64,
+    pub(super) y_m: f64,
+    pub(super) z_m: f64,
+    /// Chance that it is this one if it is one of them, 0 to 1.
+    pub(super) weight: f64,
+}
+
+impl AnswerRow {
+    pub(super) fn new(answer: &PoseAnswer) -> Self {
+        let PlanarPose { theta_rad, y_m, z_m } = answer.grasp_from_object.inverse();
+        Self { angle_deg: theta_rad.to_degrees(), y_m, z_m, weight: answer.weight }
+    }
 }
 
 /// A tool that was tried.

@@ -8,6 +8,8 @@
 //!
 //! Where the membrane says too little, the mask alone answers, and the report says so ([`Basis`]).
 
+mod answers;
+mod anywhere;
 mod cost;
 mod curvature;
 mod evidence;
@@ -17,13 +19,15 @@ mod smooth;
 mod template;
 #[cfg(test)]
 mod tests;
+mod turned;
 
 use serde::{Deserialize, Serialize};
 
 use super::register::check_overlap;
-use super::{AlignConfig, AlignError, AlignReport, Ask, Register, Scene};
+use super::{AlignConfig, AlignError, AlignReport, Ask, Outcome, Range, Register, Rung, RungAttempt, Scene};
 use crate::frames::PlanarPose;
 use crate::tool::ToolModel;
+pub use answers::PoseAnswer;
 pub use evidence::{Elsewhere, Evidence, MembraneEvidence};
 use problem::{Problem, check};
 
@@ -32,6 +36,8 @@ use problem::{Problem, check};
 pub struct JointConfig {
     /// Poses to start from, `grasp_from_object`: exactly these. Empty: its own.
     pub starts: Vec<PlanarPose>,
+    /// Poses among which the tool is looked for where the prior of `mask` does not have it; not beyond that one unless wider.
+    pub range: Range,
     /// The registration by the mask alone, which answers where the membrane says little; its prior is this one's.
     pub mask: AlignConfig,
     /// Places of the membranes that are compared in each band, coarse to fine, and for the answer (in the finest).
@@ -48,6 +54,11 @@ pub struct JointConfig {
     pub max_iterations: usize,
     /// Costs this close, as a share, do not tell two ends apart.
     pub close: f64,
+    /// Share of the membrane's relief that an answer from the prior must explain, or scouts start all around: of a membrane that
+    /// hangs from the tool, and of one that reaches the middle plane.
+    pub stands: [f64; 2],
+    /// Share of its cost that another pose must be ahead of it.
+    pub ahead: f64,
     /// Share of the membrane's relief below which the membrane alone is asked as well, and answers if it explains more.
     pub doubtful: f64,
     /// Least share of the membrane's relief that the tool must explain, or the mask alone answers.
@@ -80,6 +91,7 @@ impl Default for JointConfig {
     fn default() -> Self {
         Self {
             starts: Vec::new(),
+            range: Range::default(),
             mask: AlignConfig::default(),
             points: [100, 150, 400, 1200],
             kernels_m: [4e-3, 1e-3, 0.5e-3, 0.5e-3],
@@ -95,6 +107,8 @@ impl Default for JointConfig {
             },
             max_iterations: 20,
             close: 0.15,
+            stands: [0.3, 0.4],
+            ahead: 0.03,
             doubtful: 0.3,
             explained: 0.05,
             predicted_explained: 0.5,
@@ -156,6 +170,18 @@ impl JointFit {
     }
 }
 
+impl JointConfig {
+    /// True for a pose in the prior or in the range.
+    fn allows(&self, pose: PlanarPose) -> bool {
+        self.mask.prior.allows(pose) || self.is_wider() && self.range.prior().allows(pose)
+    }
+
+    /// True where poses beyond the prior may be looked for.
+    fn is_wider(&self) -> bool {
+        self.range != Range::default()
+    }
+}
+
 impl Register for JointConfig {
     fn run(&self, scene: &Scene<'_>, tool: &ToolModel, ask: Ask<'_>) -> Result<AlignReport, AlignError> {
         let mut config = self.clone();
@@ -167,10 +193,12 @@ impl Register for JointConfig {
             config.starts = starts.to_vec();
         }
         check(&config)?;
-        let by_mask = |fit: JointFit| -> Result<AlignReport, AlignError> {
-            let report = AlignConfig { starts: config.starts.clone(), ..self.mask.clone() }.run(scene, tool, ask)?;
-            Ok(AlignReport { joint: Some(fit), ..report })
+        let by_mask_from = |fit: JointFit, starts: Vec<PlanarPose>| -> Result<AlignReport, AlignError> {
+            let report = AlignConfig { starts, ..self.mask.clone() }.run(scene, tool, ask)?;
+            let within_prior = report.within_prior || config.allows(report.grasp_from_object);
+            Ok(AlignReport { joint: Some(fit), range: config.range, within_prior, ..report })
         };
+        let by_mask = |fit: JointFit| by_mask_from(fit, config.starts.clone());
         if scene.images().is_empty() {
             return by_mask(JointFit::by_mask(Basis::NoImage));
         }
@@ -183,18 +211,24 @@ impl Register for JointConfig {
             if finite.clone().next().is_some() {
                 check_overlap(finite, &tool.field, &config.starts)?;
             }
-            return Ok(problem.report(scene.yz(), problem.solve()));
+            return Ok(problem.report(scene.yz(), problem.solve(false)));
         }
-        let mut answer = problem.solve();
+        let mut answer = problem.solve(config.is_wider());
         if problem.is_predicted() && answer.fit.explained < config.predicted_explained {
             return by_mask(JointFit { basis: Basis::Unlike, mask_weight: 1.0, ..answer.fit });
         }
-        if answer.fit.explained < config.doubtful {
+        if answer.fit.explained < config.doubtful && answer.rung != Rung::Around {
             // A bad mask can lead all scouts away from what the membrane shows plainly.
             answer = problem.solve_without_mask(&answer, config.explained).unwrap_or(answer);
         }
         if answer.fit.explained < config.explained {
-            return by_mask(JointFit { basis: Basis::LittleContact, mask_weight: 1.0, ..answer.fit });
+            let fit = JointFit { basis: Basis::LittleContact, mask_weight: 1.0, ..answer.fit };
+            let (found, around) = (by_mask(fit), problem.start_around(&answer));
+            // The mask alone may have no answer in the prior either.
+            let settled = |end: &RungAttempt| end.outcome == Outcome::Accepted || end.rung < Rung::Grid;
+            let stands =
+                around.is_empty() || found.as_ref().is_ok_and(|found| found.ladder.last().is_some_and(settled));
+            return if stands { found } else { by_mask_from(fit, around) };
         }
         Ok(problem.report(scene.yz(), answer))
     }

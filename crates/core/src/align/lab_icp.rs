@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 
 use super::register::{Ask, Register, Scene, check_overlap, clean_scene};
 use super::samples::{Matcher, Samples};
-use super::{AlignError, AlignReport, Fate, PointFit, Prior, Run, Rung, Stop, TraceStep, observability};
+use super::{AlignError, AlignReport, Fate, PointFit, Prior, Range, Run, Rung, Stop, TraceStep, observability};
 use crate::frames::PlanarPose;
 use crate::tool::ToolModel;
 
@@ -207,6 +207,9 @@ pub fn lab_icp(points: &[DVec3], model: &LabModel, config: &LabIcpConfig) -> Res
         observability: None,
         joint: None,
         evidence: None,
+        answers: Vec::new(),
+        ends: Vec::new(),
+        range: Range::default(),
         trace: paper.trace,
         fits,
     })

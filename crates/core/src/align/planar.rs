@@ -19,7 +19,7 @@ use super::search::{Progress, Search};
 use super::uncertainty::Uncertainty;
 use super::{
     AlignConfig, AlignError, AlignReport, Certificate, Fate, MIN_POINTS, MIN_SHARE, Observability, Outcome, PointFit,
-    Prior, REACH_M, Run, Rung, RungAttempt, clean,
+    Prior, REACH_M, Range, Run, Rung, RungAttempt, clean,
 };
 use crate::field::DistanceField;
 use crate::frames::PlanarPose;
@@ -173,7 +173,7 @@ impl<'a> Problem<'a> {
     fn climb(&self, rung: Rung, earlier: Option<&Earlier>) -> Result<Answer, AlignError> {
         let prior = &self.config.prior;
         match rung {
-            Rung::Fixed => Err(AlignError::Config { what: "rungs" }),
+            Rung::Fixed | Rung::Around => Err(AlignError::Config { what: "rungs" }),
             Rung::Single => self.descend(rung, vec![PlanarPose::default()], self.search(), None),
             Rung::Certified => self.certified(earlier),
             Rung::Several => self.descend(rung, several(prior), self.search(), earlier),
@@ -408,6 +408,9 @@ impl<'a> Problem<'a> {
             observability: Some(answer.seen),
             joint: None,
             evidence: None,
+            answers: Vec::new(),
+            ends: Vec::new(),
+            range: Range::default(),
             trace: answer.trace,
             fits: if config.record { fits(points_yz, self.field, pose, config.final_kernel_m()) } else { Vec::new() },
         }

@@ -390,6 +390,6 @@ fn graded_pose(sample: &Sample, tool: &ToolModel) -> Option<(Grade, PlanarPose)>
     let images: Vec<_> = images.collect();
     let contacts = Contacts { points: &points, images: &images };
     let ask = Ask { evidence: true, ..Ask::default() };
-    let report = register_with(&*Registration::Joint.method(), contacts, tool, ask).ok()?;
+    let report = register_with(&*Registration::default().method(), contacts, tool, ask).ok()?;
     Some((Verdict::of(&report)?.grade, report.grasp_from_object))
 }

@@ -93,7 +93,9 @@ pub fn pose<'a>(
     let mut report = found.map_err(|err| TaskError::from_error("Pose", &err))?;
     // The time of the registration, not that of its evidence.
     let ms = start.elapsed().as_secs_f64() * 1e3;
-    report.evidence = ask.evidence.then(|| Evidence::about(&Scene::new(contacts), tool, &report));
+    if ask.evidence {
+        Evidence::gather(&Scene::new(contacts), tool, &mut report);
+    }
     let angle_rad = report.lab_angle_rad();
     let truth_rad = truth.map(|t| t.inverse().theta_rad);
     Ok(PoseResult {

@@ -1,5 +1,8 @@
 //! The cost of a pose: distance of the membrane from the template, and of the mask from the silhouette.
 
+use std::rc::Rc;
+use std::sync::Arc;
+
 use glam::DVec2;
 
 use super::template::BandField;
@@ -46,6 +49,11 @@ impl Patch {
     pub(super) fn len(&self) -> usize {
         self.len
     }
+
+    /// Places about the common center, in nodes, with the band there, meters.
+    pub(super) fn places(&self) -> impl Iterator<Item = (f32, f32, f32)> {
+        (0..self.len).map(|i| (self.y[i], self.z[i], self.band[i]))
+    }
 }
 
 /// Residuals of a step of lanes and how they change with the place: meters, and meters per node.
@@ -63,9 +71,10 @@ pub(super) struct Read {
 }
 
 impl BandField {
-    /// Turn (cosine, sine) and place (nodes) of a state.
+    /// Turn (cosine, sine) and place (nodes) of a state, from the nodes of a patch to those of the field.
     pub(super) fn motion(&self, state: State) -> [f32; 4] {
-        let (turn, place) = (DVec2::from_angle(state.phi), (state.place - self.origin) / STEP_M);
+        let turn = DVec2::from_angle(state.phi) * (STEP_M / self.step_m);
+        let place = (state.place - self.origin) / self.step_m;
         [turn.x as f32, turn.y as f32, place.x as f32, place.y as f32]
     }
 
@@ -122,7 +131,7 @@ impl BandField {
                 sums.pull(l, r[l], [gz[l] * ay[l] - gy[l] * az[l], gy[l], gz[l]], w, bent);
             }
         }
-        sums.total([1.0 / ANGLE_SCALE_M, 1.0 / STEP_M, 1.0 / STEP_M])
+        sums.total([1.0 / ANGLE_SCALE_M, 1.0 / self.step_m, 1.0 / self.step_m])
     }
 
     /// Residuals at a state and the template there, meters.
@@ -151,7 +160,7 @@ pub(super) struct Relief {
 
 impl Relief {
     /// The relief of patches at a state.
-    pub(super) fn of(patches: &[(&BandField, Patch)], state: State, kernel_m: f64) -> Self {
+    pub(super) fn of(patches: &[(Arc<BandField>, Rc<Patch>)], state: State, kernel_m: f64) -> Self {
         let square = kernel_m.powi(2) as f32;
         let capped = |height: f32| height / (square + height * height).sqrt();
         let product = |a: f32, b: f32| f64::from(capped(a)) * f64::from(capped(b));
@@ -221,7 +230,7 @@ impl MaskPart<'_> {
 /// shares of their squared kernel widths, so 0 to 1.
 pub(super) struct Joint<'a> {
     /// The patch of each finger with its template.
-    pub(super) fingers: &'a [(&'a BandField, Patch)],
+    pub(super) fingers: &'a [(Arc<BandField>, Rc<Patch>)],
     pub(super) kernel_m: f64,
     pub(super) mask: Option<MaskPart<'a>>,
     /// Look-ups so far.

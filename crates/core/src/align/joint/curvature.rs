@@ -4,7 +4,7 @@ use glam::DVec2;
 use nalgebra::Matrix3;
 
 use super::cost::{Joint, Relief, noise_m};
-use super::problem::Problem;
+use super::problem::{Patches, Problem};
 use crate::align::Uncertainty;
 use crate::align::batch::State;
 use crate::align::search::Cost as _;
@@ -33,16 +33,21 @@ impl Problem<'_> {
     /// Uncertainty of a pose from the membranes.
     pub(super) fn uncertainty(&self, pose: PlanarPose) -> Uncertainty {
         let at = State::from_pose(pose, self.centroid());
-        let patches = self.patches_of(self.answer_band(), PLACES);
-        let noise_m = noise_m(Relief::of(&patches, at, KERNEL_M).residuals_m).max(1e-6);
+        let patches = self.patches_at(self.answer_band(), PLACES, at);
         let mut joint = Joint { fingers: &patches, kernel_m: KERNEL_M, mask: None, lookups: 0 };
+        let information = in_the_hand(&joint.sums(at).h, pose) * self.telling(&patches, at);
+        Uncertainty::new(information, self.centroid(), pose, patches.len().max(1) as f64)
+    }
+
+    /// Information of what the mean cost of patches rises by: twice the logarithm of how much less likely a pose is.
+    pub(super) fn telling(&self, patches: &Patches, at: State) -> f64 {
+        let noise_m = noise_m(Relief::of(patches, at, KERNEL_M).residuals_m).max(1e-6);
         let shared_m = match (self.is_predicted(), self.hangs()) {
             (true, _) => PREDICTED_SHARED_M,
             (false, true) => HANGING_SHARED_M,
             (false, false) => SHARED_M,
         };
-        let scale = KERNEL_M.powi(2) * joint.points() as f64 / (4.0 * shared_m * noise_m);
-        let information = in_the_hand(&joint.sums(at).h, pose) * scale;
-        Uncertainty::new(information, self.centroid(), pose, patches.len().max(1) as f64)
+        let points: usize = patches.iter().map(|(_, patch)| patch.len()).sum();
+        KERNEL_M.powi(2) * points as f64 / (4.0 * shared_m * noise_m)
     }
 }

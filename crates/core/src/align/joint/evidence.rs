@@ -4,12 +4,14 @@
 use serde::{Deserialize, Serialize};
 
 use super::JointConfig;
+use super::answers::{PoseAnswer, shared};
 use super::cost::{Joint, Relief};
 use super::problem::{Patches, Problem};
 use crate::align::batch::State;
 use crate::align::search::{Cost, Progress, minimize};
-use crate::align::{AlignReport, Contacts, PadImage, Scene, Uncertainty};
+use crate::align::{AlignReport, Contacts, PadImage, Range, Scene, Uncertainty};
 use crate::mesh::sampling::spread;
+use crate::symmetry::Symmetry;
 use crate::tool::ToolModel;
 
 /// Contact points at most this far outside the silhouette lie on the tool, meters: a pixel of the mask and a half.
@@ -86,7 +88,7 @@ struct Look {
 impl Evidence {
     /// The evidence about the answer of a registration. About a millisecond, and the first time for a tool what its
     /// templates take.
-    pub fn about(scene: &Scene<'_>, tool: &ToolModel, report: &AlignReport) -> Self {
+    pub fn about(scene: &Scene<'_>, tool: &ToolModel, report: &AlignReport) -> (Self, Vec<PoseAnswer>) {
         let pose = report.grasp_from_object;
         let finite: Vec<_> = scene.yz().iter().filter(|p| p.is_finite()).collect();
         let object_from_grasp = pose.inverse();
@@ -95,7 +97,7 @@ impl Evidence {
             .iter()
             .filter(|&&i| tool.field.sample(object_from_grasp.transform_yz(*finite[i])).distance <= ON_TOOL_M);
         let on_tool = on.count() as f64 / chosen.len().max(1) as f64;
-        let config = JointConfig::default();
+        let config = JointConfig { range: report.range, ..JointConfig::default() };
         let problem = Problem::new(scene, tool, &config).ok().flatten();
         let found = problem.as_ref().map(|problem| problem.evidence(scene, State::from_pose(pose, problem.centroid())));
         let by_membrane = report.joint.is_some_and(|fit| fit.basis.has_membrane());
@@ -107,21 +109,32 @@ impl Evidence {
             _ => Uncertainty::of_mask(scene.yz(), &tool.field, pose),
         };
         let membrane = found.map(|(evidence, _)| evidence);
-        Self { on_tool, membrane, uncertainty }
+        let answers = match &problem {
+            _ if report.range == Range::default() => Vec::new(),
+            Some(problem) if by_membrane => problem.answers(report, &Symmetry::of(tool)),
+            _ => shared(vec![(pose, 1.0)], &Symmetry::of(tool), report.range),
+        };
+        (Self { on_tool, membrane, uncertainty }, answers)
+    }
+
+    /// Adds the evidence about its answer to a report, and the other answers.
+    pub fn gather(scene: &Scene<'_>, tool: &ToolModel, report: &mut AlignReport) {
+        let (evidence, answers) = Self::about(scene, tool, report);
+        (report.evidence, report.answers) = (Some(evidence), answers);
     }
 }
 
 impl Problem<'_> {
     /// The evidence of the membranes about a pose, and the pose near by that they would have without the mask.
     fn evidence(&self, scene: &Scene<'_>, at: State) -> (MembraneEvidence, State) {
-        let look = self.patches_of(LOOK.band, LOOK.places);
+        let look = self.patches_at(LOOK.band, LOOK.places, at);
         let likeness = look
             .chunks(1)
             .filter(|finger| finger[0].1.len() > 0)
             .map(|finger| Relief::of(finger, at, LOOK.kernel_m).likeness())
             .fold(1.0, f64::min);
         let descent =
-            DESCENT.map(|look| (self.patches_of(look.band.min(self.answer_band()), look.places), look.kernel_m));
+            DESCENT.map(|look| (self.patches_at(look.band.min(self.answer_band()), look.places, at), look.kernel_m));
         let all = 0..descent[0].0.len();
         let (own, gain) = descend(&descent, all.clone(), at);
         let alone: Vec<(State, f64)> = all.map(|finger| descend(&descent, finger..finger + 1, own)).collect();
@@ -132,12 +145,12 @@ impl Problem<'_> {
             _ => None,
         };
         let misfit = Relief::of(&look, at, LOOK.kernel_m).misfit();
-        let swapped = self.swapped_misfit(scene).filter(|_| misfit > 0.0).map(|swapped| 1.0 - swapped / misfit);
+        let swapped = self.swapped_misfit(scene, at).filter(|_| misfit > 0.0).map(|swapped| 1.0 - swapped / misfit);
         (MembraneEvidence { likeness, misfit, own: Elsewhere::between(at, own, gain), fingers, swapped }, own)
     }
 
     /// Misfit in the best pose for the images of two fingers exchanged.
-    fn swapped_misfit(&self, scene: &Scene<'_>) -> Option<f64> {
+    fn swapped_misfit(&self, scene: &Scene<'_>, at: State) -> Option<f64> {
         let [a, b] = scene.images() else { return None };
         if a.imprint.size() != b.imprint.size() {
             return None;
@@ -145,13 +158,14 @@ impl Problem<'_> {
         let images = [PadImage { camera: a.camera, ..*b }, PadImage { camera: b.camera, ..*a }];
         let scene = Scene::new(Contacts { points: &[], images: &images });
         let swapped = Problem::new(&scene, self.tool(), self.config()).ok()??;
-        let end = swapped.solve().end();
-        Some(Relief::of(&swapped.patches_of(LOOK.band, LOOK.places), end, LOOK.kernel_m).misfit())
+        let beyond = !self.config().mask.prior.allows(at.to_pose(self.centroid()));
+        let end = swapped.solve(beyond && self.config().is_wider()).end();
+        Some(Relief::of(&swapped.patches_at(LOOK.band, LOOK.places, end), end, LOOK.kernel_m).misfit())
     }
 }
 
 /// End of a descent of some fingers alone, without the mask, and the share of their misfit that went away.
-fn descend(descent: &[(Patches<'_>, f64)], fingers: std::ops::Range<usize>, from: State) -> (State, f64) {
+fn descend(descent: &[(Patches, f64)], fingers: std::ops::Range<usize>, from: State) -> (State, f64) {
     let mut at = Progress::new(from);
     let (mut before, mut after) = (0.0, 0.0);
     for (patches, kernel_m) in descent {

@@ -6,6 +6,7 @@ use nalgebra::{SMatrix, SVector};
 use super::smooth::{Band, Layer, Smooth};
 use crate::align::PadImage;
 use crate::align::lanes::{MAGIC, MAGIC_MASK};
+use crate::frames::PlanarPose;
 use crate::mesh::sampling::spread;
 use crate::tent::FreeShape;
 
@@ -230,6 +231,7 @@ impl Quadratic {
             slope: slope * Self::UNIT_M,
             bend: DVec2::new(2.0 * f[3], 2.0 * f[5]).max(DVec2::ZERO),
             reaches: false,
+            of: PlanarPose::default(),
         }
     }
 }

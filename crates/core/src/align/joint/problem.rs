@@ -1,5 +1,7 @@
 //! The search for the pose under which templates and silhouette fit the membranes and the mask.
 
+use std::f64::consts::TAU;
+use std::rc::Rc;
 use std::sync::Arc;
 
 use glam::DVec2;
@@ -7,7 +9,8 @@ use glam::DVec2;
 use super::cost::{Joint, MaskPart, Noted, Patch, Relief, noise_m};
 use super::image::Image;
 use super::smooth::BANDS;
-use super::template::{BandField, Template, template};
+use super::template::{BandField, Grasp, Template, grasp_of, template};
+use super::turned::{Frame, Turned, turned};
 use super::{Basis, JointConfig, JointFit};
 use crate::align::batch::{Cloud, State};
 use crate::align::observability::of_cloud;
@@ -29,6 +32,11 @@ const MASK_SCOUTS_M: [f64; 2] = [8e-3, 2e-3];
 const MORE: [[f64; 2]; 2] = [[0.45, -0.45], [0.9, -0.9]];
 /// Steps that move no point by more than about this, meters, end the descents.
 pub(super) const STEPS_M: [f64; 4] = [1e-4, 5e-5, 5e-5, 1e-5];
+
+/// Ends of scouts from all around that are refined.
+const ENDS: usize = 4;
+/// Most steps of scouts that start all around, and of the last descent.
+const STEPS_AROUND: [usize; LAST + 1] = [6, 8, 12, 20];
 
 /// Refuses settings that make no sense.
 pub(super) fn check(config: &JointConfig) -> Result<(), AlignError> {
@@ -64,11 +72,12 @@ pub(super) fn check(config: &JointConfig) -> Result<(), AlignError> {
 /// A finger's image and its template.
 struct Finger {
     image: Image,
+    /// The template of the lab's grasps.
     template: Arc<Template>,
 }
 
 /// The patches of the fingers in one band.
-pub(super) type Patches<'p> = Vec<(&'p BandField, Patch)>;
+pub(super) type Patches = Vec<(Arc<BandField>, Rc<Patch>)>;
 
 /// A question prepared for every band.
 pub(super) struct Problem<'a> {
@@ -80,8 +89,7 @@ pub(super) struct Problem<'a> {
     /// The mask's points for scouts and for the answer; `None` where they are too few.
     mask: Option<[Cloud; 2]>,
     not_finite: usize,
-    /// True where the free membrane does not reach the middle plane.
-    hangs: bool,
+    free: FreeShape,
     /// True where a model predicted the images.
     predicted: bool,
 }
@@ -96,6 +104,8 @@ pub(super) struct Answer {
     pub(super) lookups: usize,
     trace: Vec<TraceStep>,
     points: usize,
+    /// Ends that were refined alike after scouts had started all around.
+    ends: Vec<Progress>,
 }
 
 impl Answer {
@@ -106,17 +116,30 @@ impl Answer {
 }
 
 /// Descents with what they cost and left behind.
-struct Descents<'p, 'a> {
+pub(super) struct Descents<'p, 'a> {
     problem: &'p Problem<'a>,
-    patches: [Patches<'p>; LAST + 1],
-    lookups: usize,
+    patches: [Patches; LAST + 1],
+    pub(super) lookups: usize,
     trace: Vec<TraceStep>,
+    /// Compare with the templates of the grasp at hand, rather than of the lab's.
+    pub(super) around: bool,
+}
+
+/// Patches of one band with other templates.
+fn under(patches: &Patches, templates: &[Arc<Template>], band: usize) -> Patches {
+    templates.iter().zip(patches).map(|(template, (_, patch))| (template[band].clone(), patch.clone())).collect()
 }
 
 impl Descents<'_, '_> {
     /// Goes down on one band.
-    fn descend(&mut self, run: usize, at: &mut Progress, stage: usize, weight: f64) {
+    pub(super) fn descend(&mut self, run: usize, at: &mut Progress, stage: usize, weight: f64) {
         let config = self.problem.config;
+        // A template for each place is worth its making where the answer is decided.
+        let problem = self.problem;
+        let grasp = if self.around { problem.grasp(at.state, stage == LAST) } else { Grasp::default() };
+        let templates = problem.templates(grasp);
+        let fingers = &under(&self.patches[stage], &templates, stage.min(problem.answer_band()));
+        let steps = if self.around { STEPS_AROUND[stage].min(config.max_iterations) } else { config.max_iterations };
         let last = usize::from(stage == LAST);
         let mask = self.problem.mask.as_ref().map(|clouds| MaskPart {
             field: &self.problem.tool.field,
@@ -124,17 +147,20 @@ impl Descents<'_, '_> {
             kernel_m: config.mask_kernels_m[last],
             weight,
         });
-        let mut joint = Joint { fingers: &self.patches[stage], kernel_m: config.kernels_m[stage], mask, lookups: 0 };
+        let mut joint = Joint { fingers, kernel_m: config.kernels_m[stage], mask, lookups: 0 };
         let trace = config.record.then_some(&mut self.trace);
         let mut noted = Noted { cost: &mut joint, run, centroid: self.problem.centroid, trace };
-        let sums = minimize(&mut noted, at, config.max_iterations, STEPS_M[stage]);
+        let sums = minimize(&mut noted, at, steps, STEPS_M[stage]);
         (at.cost, at.inliers, at.inlier_squares) = (sums.cost, sums.inliers, sums.inlier_squares);
         self.lookups += joint.lookups;
     }
 
     /// Share of the membranes' relief that the tool explains at a state, and the noise that it leaves, meters.
     fn told(&self, state: State) -> (f64, f64) {
-        let relief = Relief::of(&self.patches[LAST], state, self.problem.config.kernels_m[LAST]);
+        let problem = self.problem;
+        let templates = problem.templates(problem.grasp(state, true));
+        let fingers = under(&self.patches[LAST], &templates, problem.answer_band());
+        let relief = Relief::of(&fingers, state, problem.config.kernels_m[LAST]);
         (relief.explained(), noise_m(relief.residuals_m))
     }
 
@@ -151,9 +177,10 @@ impl Descents<'_, '_> {
 }
 
 /// True where two ends are the same place, as far as scouts can tell.
-fn alike(a: &State, b: &State) -> bool {
+pub(super) fn alike(a: &State, b: &State) -> bool {
     const SAME_M: f64 = 6e-4;
-    (a.phi - b.phi).abs() * ANGLE_SCALE_M < SAME_M && a.place.distance(b.place) < SAME_M
+    let turned = (a.phi - b.phi).abs();
+    turned.min((TAU - turned).abs()) * ANGLE_SCALE_M < SAME_M && a.place.distance(b.place) < SAME_M
 }
 
 impl<'a> Problem<'a> {
@@ -178,10 +205,11 @@ impl<'a> Problem<'a> {
             slope: mean(|image| image.free.slope),
             bend: mean(|image| image.free.bend),
             reaches: images.iter().all(|image| image.free.reaches),
+            ..FreeShape::default()
         };
         let fingers: Vec<Finger> = images
             .into_iter()
-            .filter_map(|image| Some(Finger { template: template(tool, image.side, free)?, image }))
+            .filter_map(|image| Some(Finger { template: template(tool, image.side, free, Grasp::default())?, image }))
             .collect();
         let places: Vec<DVec2> =
             fingers.iter().flat_map(|finger| finger.image.sample(BANDS[0], 64).map(|(place, _)| place)).collect();
@@ -202,7 +230,7 @@ impl<'a> Problem<'a> {
             })
         });
         let predicted = scene.images().iter().any(|image| image.predicted);
-        Ok(Some(Self { tool, config, fingers, centroid, mask, not_finite, predicted, hangs: !free.reaches }))
+        Ok(Some(Self { tool, config, fingers, centroid, mask, not_finite, predicted, free }))
     }
 
     /// The point about which everything turns, `(y, z)`, meters.
@@ -222,7 +250,7 @@ impl<'a> Problem<'a> {
     /// it leaves the mask out from then on.
     pub(super) fn solve_without_mask(&mut self, answer: &Answer, gain: f64) -> Option<Answer> {
         let mask = self.mask.take()?;
-        let alone = self.solve();
+        let alone = self.solve(false);
         if alone.fit.explained > answer.fit.explained + gain {
             return Some(alone);
         }
@@ -231,18 +259,19 @@ impl<'a> Problem<'a> {
     }
 
     /// The images as a stage compares them.
-    fn patches(&self, stage: usize) -> Patches<'_> {
+    fn patches(&self, stage: usize) -> Patches {
         self.patches_of(stage.min(self.answer_band()), self.config.points[stage])
     }
 
     /// Band that decides the answer: the finest that is not noise. To a membrane that hangs from the tool, and to a predicted one,
     /// lengths of 0.7 to 2 mm are.
     pub(super) fn answer_band(&self) -> usize {
-        BANDS.len() - 1 - usize::from(self.predicted || self.hangs)
+        BANDS.len() - 1 - usize::from(self.predicted || self.hangs())
     }
 
+    /// True where the free membrane does not reach the middle plane.
     pub(super) fn hangs(&self) -> bool {
-        self.hangs
+        !self.free.reaches
     }
 
     pub(super) fn is_predicted(&self) -> bool {
@@ -250,29 +279,63 @@ impl<'a> Problem<'a> {
     }
 
     /// About `points` places of the images in a band.
-    pub(super) fn patches_of(&self, band: usize, points: usize) -> Patches<'_> {
+    pub(super) fn patches_of(&self, band: usize, points: usize) -> Patches {
         let nodes: usize = self.fingers.iter().map(|finger| finger.image.len()).sum();
         let patch = |finger: &Finger| {
             let count = (points * finger.image.len()).div_ceil(nodes.max(1));
             let places = finger.image.sample(BANDS[band], count);
             Patch::new(places.map(|(place, value)| (place - self.centroid, value)))
         };
-        self.fingers.iter().map(|finger| (&finger.template[band], patch(finger))).collect()
+        self.fingers.iter().map(|finger| (finger.template[band].clone(), Rc::new(patch(finger)))).collect()
+    }
+
+    /// The templates of the fingers for a grasp.
+    pub(super) fn templates(&self, grasp: Grasp) -> Vec<Arc<Template>> {
+        let of = |finger: &Finger| {
+            let made = || template(self.tool, finger.image.side, self.free, grasp);
+            if grasp == Grasp::default() { None } else { made() }.unwrap_or_else(|| finger.template.clone())
+        };
+        self.fingers.iter().map(of).collect()
+    }
+
+    /// The coarsest bands of the fingers' templates turned all around.
+    pub(super) fn turned(&self, frame: Frame) -> Vec<Arc<Turned>> {
+        let of = |finger: &Finger| turned(self.tool, finger.image.side, self.free, frame);
+        self.fingers.iter().filter_map(of).collect()
+    }
+
+    /// The grasp of a state, or that of the lab's where it is one; by its turn alone where the place is not asked for.
+    pub(super) fn grasp(&self, at: State, place: bool) -> Grasp {
+        let pose = at.to_pose(self.centroid);
+        if self.config.mask.prior.allows(pose) || !self.config.is_wider() {
+            return Grasp::default();
+        }
+        let [turn, y, z] = grasp_of(pose);
+        if place { [turn, y, z] } else { [turn, 0, 0] }
+    }
+
+    pub(super) fn frame(&self) -> Frame {
+        *self.tool.derived(|tool| Frame::of(&tool.mesh))
+    }
+
+    /// About `points` places of the images in a band, with the templates for a state.
+    pub(super) fn patches_at(&self, band: usize, points: usize, at: State) -> Patches {
+        under(&self.patches_of(band, points), &self.templates(self.grasp(at, true)), band)
     }
 
     fn allowed(&self, at: &Progress) -> bool {
         self.config.mask.prior.allows(at.state.to_pose(self.centroid))
     }
 
-    fn descents(&self) -> Descents<'_, 'a> {
+    pub(super) fn descents(&self) -> Descents<'_, 'a> {
         let patches = std::array::from_fn(|stage| self.patches(stage));
-        Descents { problem: self, patches, lookups: 0, trace: Vec::new() }
+        Descents { problem: self, patches, lookups: 0, trace: Vec::new(), around: false }
     }
 
     /// Two scouts from the middle of the prior, one by the bands and one by the mask; two more, and two more, while the best
     /// is alone, has a rival of nearly its cost elsewhere, or lies where no gripper holds a tool. Then the best two are
-    /// refined.
-    pub(super) fn solve(&self) -> Answer {
+    /// refined. Where that answer does not stand, scouts may start all around.
+    pub(super) fn solve(&self, around: bool) -> Answer {
         let config = self.config;
         let own = config.starts.is_empty();
         let mut starts = if own { vec![PlanarPose::default()] } else { config.starts.clone() };
@@ -319,8 +382,49 @@ impl<'a> Problem<'a> {
             explained,
         };
         let points = descents.patches[LAST].iter().map(|(_, patch)| patch.len()).sum();
-        let Descents { lookups, trace, .. } = descents;
-        Answer { starts, runs, winner, rung, fit, lookups, trace, points }
+        let mut answer =
+            Answer { starts, runs, winner, rung, fit, lookups: 0, trace: Vec::new(), points, ends: Vec::new() };
+        let stands =
+            if self.predicted { config.predicted_explained } else { config.stands[usize::from(self.free.reaches)] };
+        if around && own && explained < stands {
+            self.look_around(&mut answer, &mut descents);
+        }
+        Answer { lookups: descents.lookups, trace: descents.trace, ..answer }
+    }
+
+    /// Pose that the scouts all around found, for the mask to start from; none where the answer is not theirs.
+    pub(super) fn start_around(&self, answer: &Answer) -> Vec<PlanarPose> {
+        let end = answer.end().to_pose(self.centroid);
+        (answer.rung == Rung::Around).then_some(end).into_iter().collect()
+    }
+
+    /// Scouts all around; a pose that they find is the answer if it is cheaper by a margin.
+    fn look_around(&self, answer: &mut Answer, descents: &mut Descents<'_, '_>) {
+        descents.around = true;
+        let ends = self.anywhere(descents, ENDS);
+        let Some((_, best)) = ends.first() else { return };
+        let (explained, noise_m) = descents.told(best.state);
+        let weight = self.mask_weight(noise_m, best.state);
+        let refined: Vec<(State, Progress)> = ends
+            .into_iter()
+            .map(|(start, mut at)| {
+                descents.descend(answer.runs.len(), &mut at, LAST, weight);
+                (start, at)
+            })
+            .filter(|(_, at)| self.config.allows(at.state.to_pose(self.centroid)))
+            .collect();
+        let Some((start, best)) = refined.iter().min_by(|a, b| a.1.cost.total_cmp(&b.1.cost)) else { return };
+        let mut first = Progress::new(answer.end());
+        descents.descend(answer.winner, &mut first, LAST, weight);
+        answer.ends = refined.iter().map(|(_, at)| *at).chain([first]).collect();
+        let margin = if self.allowed(&first) { self.config.ahead } else { 0.0 };
+        if best.cost < first.cost * (1.0 - margin) {
+            answer.winner = answer.runs.len();
+            answer.rung = Rung::Around;
+            answer.fit = JointFit { noise_m, mask_weight: weight, explained, ..answer.fit };
+            answer.runs.push(*best);
+            answer.starts.push(start.to_pose(self.centroid));
+        }
     }
 
     /// Runs by preference: within the prior before outside, then the cheaper one.
@@ -402,10 +506,13 @@ impl<'a> Problem<'a> {
             used: answer.points,
             inlier_share: best.inliers as f64 / answer.points.max(1) as f64,
             inlier_rms_m: (best.inlier_squares / (best.inliers as f64).max(1.0)).sqrt(),
-            within_prior: config.mask.prior.allows(pose),
+            within_prior: config.allows(pose),
             observability: seen,
             joint: Some(answer.fit),
             evidence: None,
+            answers: Vec::new(),
+            ends: answer.ends.iter().map(|at| (at.state.to_pose(self.centroid), at.cost)).collect(),
+            range: config.range,
             trace: answer.trace,
             fits,
             runs,

@@ -1,3 +1,5 @@
+use std::rc::Rc;
+
 use glam::{DVec2, DVec3};
 
 use super::cost::{Joint, MaskPart, Patch};
@@ -13,7 +15,7 @@ use crate::grid::{DepthMap, Mask};
 use crate::pose::register_with;
 use crate::rig::lab;
 use crate::sample::DepthCamera;
-use crate::sim::{SimConfig, random_grasp, simulate};
+use crate::sim::{Grasp, SimConfig, random_grasp, simulate};
 use crate::tent::FreeShape;
 use crate::units::angle_error;
 use crate::verdict::{Grade, Verdict};
@@ -29,7 +31,11 @@ pub(super) struct Touch {
 
 impl Touch {
     pub(super) fn new(tool: usize, seed: u64) -> Self {
-        let sample = simulate(&tools()[tool], random_grasp(seed), seed, &SimConfig::default());
+        Self::held(tool, random_grasp(seed), seed)
+    }
+
+    fn held(tool: usize, grasp: Grasp, seed: u64) -> Self {
+        let sample = simulate(&tools()[tool], grasp, seed, &SimConfig::default());
         let touch = |f: usize| sample.pad(lab::PADS[f]).unwrap().depth().unwrap();
         Self {
             imprints: [0, 1].map(|f| touch(f).imprint.clone()),
@@ -131,12 +137,18 @@ fn where_the_membrane_says_nothing_the_mask_answers_bit_for_bit_and_it_is_said()
 #[test]
 fn the_slope_of_the_joint_cost_is_its_derivative() {
     let touch = Touch::new(0, 3);
-    let template = template(&touch.tool, 1.0, FreeShape { bend: DVec2::splat(10.0), ..FreeShape::default() }).unwrap();
+    let template = template(
+        &touch.tool,
+        1.0,
+        FreeShape { bend: DVec2::splat(10.0), ..FreeShape::default() },
+        super::template::Grasp::default(),
+    )
+    .unwrap();
     let places = (0..200).map(|i| {
         let place = DVec2::new(f64::from(i % 20) - 10.0, f64::from(i / 20) - 5.0) * 1.3e-3;
         (place, 2e-4 * (i % 7) as f32 - 4e-4)
     });
-    let fingers = [(&template[BANDS.len() - 1], Patch::new(places.collect::<Vec<_>>().into_iter()))];
+    let fingers = [(template[BANDS.len() - 1].clone(), Rc::new(Patch::new(places.collect::<Vec<_>>().into_iter())))];
     let cloud = Cloud::new((0..96).map(|i| DVec2::new(f64::from(i % 12) - 4.0, f64::from(i / 12)) * 1.7e-3));
     let mask = MaskPart { field: &touch.tool.field, cloud: &cloud, kernel_m: 1e-3, weight: 0.1 };
     let mut joint = Joint { fingers: &fingers, kernel_m: 5e-4, mask: Some(mask), lookups: 0 };
@@ -184,6 +196,24 @@ fn the_verdict_tells_another_tool_a_blank_finger_and_swapped_ones_without_truth(
 }
 
 #[test]
+fn a_grasp_at_70_degrees_is_found_in_a_free_range_and_not_without_one() {
+    let tool = tools().iter().position(|tool| tool.name.contains("_35")).unwrap();
+    let touch = Touch::held(tool, Grasp { theta_rad: 70f64.to_radians(), x_m: 0.004, y_m: -0.008 }, 3);
+    let (points, images) = (touch.points(), touch.images());
+    let found = |range: Range| {
+        let contacts = Contacts { points: &points, images: &images };
+        let ask = Ask { evidence: true, ..Ask::default() };
+        register_with(&JointConfig { range, ..JointConfig::default() }, contacts, &touch.tool, ask).unwrap()
+    };
+    let [labs, free] = [Range::default(), Range::FREE].map(found);
+    assert!(touch.error_deg(&labs) > 20.0 && labs.answers.is_empty(), "{}", touch.error_deg(&labs));
+    assert!(touch.error_deg(&free) < 2.0 && free.rung == Rung::Around, "{}", touch.error_deg(&free));
+    assert_eq!(free.answers[0].grasp_from_object, free.grasp_from_object);
+    let objections = |report| Verdict::of(report).unwrap().against;
+    assert!(!objections(&free).iter().any(|sign| sign.what.contains("cannot hold")), "{:?}", objections(&free));
+}
+
+#[test]
 fn the_spread_is_as_wide_as_what_the_contact_leaves_open() {
     let touch = Touch::new(0, 3);
     let (report, _) = judged(&touch, &touch.tool);
@@ -203,7 +233,7 @@ fn the_spread_is_as_wide_as_what_the_contact_leaves_open() {
     // Of nothing, all that is known is what a gripper can hold.
     let nothing = Scene::new(&[][..]);
     let report = AlignReport { joint: None, grasp_from_object: PlanarPose::default(), ..report };
-    let evidence = Evidence::about(&nothing, &touch.tool, &report);
+    let evidence = Evidence::about(&nothing, &touch.tool, &report).0;
     assert_eq!((evidence.on_tool, evidence.membrane), (0.0, None));
     assert!((evidence.uncertainty.angle_rad().to_degrees() - 13.0).abs() < 0.1, "{evidence:?}");
 }
