@@ -37,7 +37,7 @@ impl std::fmt::Display for Place {
 pub struct Source {
     /// The data set.
     pub dataset: Arc<Dataset>,
-    /// Its store of labels.
+    /// Store of its labels.
     pub labels: Labels,
     /// The problems of its files and of its labels.
     pub problems: Vec<Problem>,

@@ -252,7 +252,7 @@ pub(super) fn sampler(binding: u32) -> wgpu::BindGroupLayoutEntry {
     wgpu::BindGroupLayoutEntry { binding, visibility: wgpu::ShaderStages::FRAGMENT, ty, count: None }
 }
 
-/// What a pipeline is made of.
+/// Parts of a pipeline.
 pub(super) struct PipelineParts<'a> {
     pub(super) label: &'a str,
     pub(super) module: &'a wgpu::ShaderModule,

@@ -35,7 +35,7 @@ fn said(doc: &Document) -> Said {
         .collect()
 }
 
-/// Whether a command leaves the history as it is: that of another data set, and of labels read again, is read from files.
+/// True where a command leaves the history as it is: that of another data set, and of labels read again, is read from files.
 fn stays(command: &Command) -> bool {
     match command {
         Command::Library(LibraryCommand::Open(_) | LibraryCommand::Reload) => false,
@@ -46,7 +46,7 @@ fn stays(command: &Command) -> bool {
     }
 }
 
-/// Whether a command starts what takes long, or has the data read otherwise.
+/// True where a command starts a long job, or has the data read otherwise.
 fn takes_long(command: &Command) -> bool {
     match command {
         Command::Evaluate(command) => !matches!(command, EvaluateCommand::Choose(..) | EvaluateCommand::Published(_)),

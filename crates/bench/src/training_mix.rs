@@ -19,18 +19,8 @@ const ANY_ANGLE: f64 = 0.25;
 const ANY_PLACE_M: f64 = 0.015;
 
 /// Mix that touches are drawn from.
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    Default,
-    PartialEq,
-    Eq,
-    serde::Serialize,
-    strum::EnumIter,
-    strum::EnumString,
-    strum::IntoStaticStr
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(serde::Serialize, strum::EnumIter, strum::EnumString, strum::IntoStaticStr)]
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
 pub enum Mix {

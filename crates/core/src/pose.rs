@@ -46,20 +46,8 @@ impl Gate {
 
 /// Registration that answers. As text its key, with `:gate=MM` behind it where another gate was chosen: `joint`, `joint:range=180,40`,
 /// `distance_field:gate=1.5`.
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    PartialEq,
-    Eq,
-    PartialOrd,
-    Ord,
-    Hash,
-    Serialize,
-    Deserialize,
-    strum::EnumIter,
-    strum::IntoStaticStr
-)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Serialize, Deserialize, strum::EnumIter, strum::IntoStaticStr)]
 #[serde(try_from = "String", into = "String")]
 #[strum(serialize_all = "snake_case")]
 pub enum Registration {

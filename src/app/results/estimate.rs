@@ -93,7 +93,7 @@ fn note(state: &mut State, imprint: &ImprintKey, mask: Option<&MaskVersion>, mad
     }
 }
 
-/// What is known of an estimate already; `None` if an input is not there.
+/// The part of an estimate that is there already; `None` if an input is missing.
 fn begun(state: &State, key: &EstimateKey, recipe: &Recipe) -> Option<Estimate> {
     let known = &state.results.estimates;
     if let (Some((_, registration)), Some(cloud)) = (key.pose.as_ref(), known.get(&key.its_cloud())) {

@@ -259,7 +259,7 @@ fn following(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.add_space(8.0);
 }
 
-/// What to do on the first start; gone for good when dismissed.
+/// Advice on the first start; gone for good when dismissed.
 pub(crate) fn hint(cx: &mut Cx<'_>, ctx: &egui::Context) {
     let demo = cx.state.library.open.as_ref().is_some_and(|open| open.place == Place::Demo);
     if cx.state.settings.hint_dismissed || !demo {

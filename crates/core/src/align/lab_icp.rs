@@ -32,19 +32,8 @@ const INLIER_M: f64 = 1e-3;
 const GATE_M: f64 = 0.015;
 
 /// A property of the lab's multi-start variant that spoils poses without a word.
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    PartialEq,
-    Eq,
-    Serialize,
-    Deserialize,
-    strum::EnumIter,
-    strum::EnumString,
-    strum::IntoStaticStr,
-    strum::Display
-)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Serialize, Deserialize, strum::EnumIter, strum::EnumString, strum::IntoStaticStr, strum::Display)]
 #[serde(rename_all = "kebab-case")]
 #[strum(serialize_all = "kebab-case")]
 pub enum PaperTrap {

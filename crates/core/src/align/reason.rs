@@ -6,21 +6,8 @@ use super::{Fate, PointFit};
 use crate::grid::{Grid, Mask};
 
 /// Reason why one pixel of an imprint does or does not pull in a registration.
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    PartialEq,
-    Eq,
-    Hash,
-    PartialOrd,
-    Ord,
-    Serialize,
-    Deserialize,
-    strum::EnumIter,
-    strum::Display,
-    strum::EnumCount
-)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Serialize, Deserialize, strum::EnumIter, strum::Display, strum::EnumCount)]
 #[serde(rename_all = "snake_case")]
 pub enum Reason {
     /// Near the surface: it pulls.

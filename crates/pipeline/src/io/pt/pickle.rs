@@ -54,7 +54,7 @@ enum Value {
     Int(i64),
     Float(f64),
     Bool(bool),
-    /// Its depth, and its parts, none of which is a dict.
+    /// Depth, and parts, none of which is a dict.
     Tuple(usize, Rc<[Value]>),
     /// Texts to values, none of which is a dict.
     Dict(Rc<RefCell<Items>>),
@@ -244,7 +244,7 @@ fn tuple(parts: Vec<Value>) -> Value {
     }
 }
 
-/// What a class or function makes of its arguments.
+/// Result of a class or function, called with its arguments.
 fn made_by(callable: &Value, arguments: &Value) -> Value {
     let (Value::Name(name), Value::Tuple(_, arguments)) = (callable, arguments) else {
         return Value::Other("an object".into());
