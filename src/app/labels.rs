@@ -107,6 +107,8 @@ pub(super) fn step(state: &mut State, command: LabelsCommand, effects: &mut Vec<
         LabelsCommand::Close => close(state, effects),
         LabelsCommand::CancelStroke => cancel_stroke(state),
         LabelsCommand::Corner(at_px) => corner(state, at_px),
+        // The journal could not hold a size that is no number, and the change could not be undone.
+        LabelsCommand::CleanUp(clean_up) if !clean_up.size_mm.is_finite() => {}
         LabelsCommand::CleanUp(clean_up) => {
             clean(state, clean_up, effects);
         }

@@ -39,8 +39,6 @@ fn said(doc: &Document) -> Said {
 fn stays(command: &Command) -> bool {
     match command {
         Command::Library(LibraryCommand::Open(_) | LibraryCommand::Reload) => false,
-        // A size that is no number comes back from the journal as none.
-        Command::Labels(LabelsCommand::CleanUp(clean_up)) => clean_up.size_mm.is_finite(),
         Command::Answer(Answer::TaskResult(_, end)) => !matches!(end.kind, TaskKind::Import | TaskKind::ReadOtherwise),
         _ => true,
     }
