@@ -22,7 +22,7 @@ const SCREEN_PX: f32 = 460.0;
 /// Samples of a still along each side of a pixel, on top of the device's own.
 const FINE: u32 = 2;
 /// Widest still that gets them; larger ones have pixels enough.
-const MOST_FINE_PX: u32 = 4096;
+const MOST_FINE_PX: u32 = 2048;
 /// Largest texture that is drawn at once, pixels along one side: a software device has a gigabyte of them to fill.
 const MOST_TEXTURE_PX: u32 = 4096;
 /// Diameter of a contact point, meters.

@@ -33,8 +33,13 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
         if shown == Network::Generator && cx.state.learn.adapted.is_none() && learn::curves(cx.state, shown).is_empty()
         {
             generator::choices(cx, ui);
-            start(cx, ui, shown);
-            return generator::nothing_yet(cx, ui);
+            // Before the first fit the invitation has the button.
+            let begun =
+                cx.state.learn.stopped[shown as usize].is_some() || cx.state.tasks.of_kind(TaskKind::Learn).is_some();
+            if begun {
+                start(cx, ui, shown);
+            }
+            return generator::nothing_yet(cx, ui, begun);
         }
         ScrollArea::vertical().auto_shrink(false).id_salt(("adapt", shown as usize)).show(ui, |ui| {
             match shown {

@@ -180,14 +180,10 @@ fn comparison(cx: &mut Cx<'_>, ui: &mut Ui) {
     );
     let fingers = cx.state.rig().pads().filter(|f| cx.state.fingers().contains(f));
     for finger in fingers {
-        if let Some(recipe) = results::chosen(cx.state, finger) {
-            let outdated = results::outdated(cx.state, finger).is_some();
-            let color = if outdated { cx.p.caution } else { cx.p.weak };
-            let text = RichText::new(cx.state.library.made_with(recipe)).size(SMALL).color(color);
-            let label = ui.add(Label::new(text).wrap());
-            if outdated {
-                label.on_hover_text("The current settings would give another prediction");
-            }
+        // What it was made with stands under the image; here only that it is not what would be made now.
+        if let Some(outdated) = results::outdated(cx.state, finger) {
+            let text = RichText::new("Made with other settings").size(SMALL).color(cx.p.caution);
+            ui.label(text).on_hover_text(outdated.made_with);
         }
         match results::comparison(cx.state, finger) {
             Lookup::Ready(c) | Lookup::Stale(c) => {

@@ -31,7 +31,7 @@ pub(super) fn worth(cx: &mut Cx<'_>, ui: &mut Ui) {
 }
 
 /// The invitation to a first fit.
-pub(super) fn nothing_yet(cx: &mut Cx<'_>, ui: &mut Ui) {
+pub(super) fn nothing_yet(cx: &mut Cx<'_>, ui: &mut Ui, begun: bool) {
     let (what, why) = match cx
         .state
         .tasks
@@ -45,7 +45,8 @@ pub(super) fn nothing_yet(cx: &mut Cx<'_>, ui: &mut Ui) {
              seconds, and the score is on pairs that were left out",
         ),
     };
-    let action = Action::FitPairs.command(cx.state).map(|_| ("Fit to my pairs", Action::FitPairs.tooltip()));
+    let action = Action::FitPairs.command(cx.state).filter(|_| !begun);
+    let action = action.map(|_| ("Fit to my pairs", Action::FitPairs.tooltip()));
     if empty::show(ui, what, why, action) {
         cx.act(Action::FitPairs);
     }

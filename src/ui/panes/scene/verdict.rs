@@ -23,6 +23,8 @@ use touch2touch_core::verdict::Grade;
 const HEIGHT: f32 = 22.0;
 /// Height of its letters, points.
 const LINE: f32 = 12.0;
+/// Width from which the line has room for both errors, points.
+const WIDE: f32 = 290.0;
 
 /// True where there is no pose because the mask has too few contact points.
 fn lacks_contact(state: &State, source: ImprintSource) -> bool {
@@ -37,8 +39,8 @@ fn lacks_contact(state: &State, source: ImprintSource) -> bool {
 
 /// The line; takes its height from the top of the pane. What mends both sides is offered on the `first`.
 pub(super) fn line(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, first: bool) {
-    let (text, color, details) = said(cx, source);
     let width = ui.available_width();
+    let (text, color, details) = said(cx, source, width >= WIDE);
     let (rect, response) = ui.allocate_exact_size(vec2(width, HEIGHT), Sense::hover());
     ui.painter().rect_filled(rect, 0.0, cx.p.frame);
     ui.painter().circle_filled(rect.left_center() + vec2(12.0, 0.0), 4.0, color);
@@ -90,7 +92,7 @@ pub(super) fn line(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, first: b
 }
 
 /// The line, its color, and what there is besides.
-fn said(cx: &Cx<'_>, source: ImprintSource) -> (String, Color32, Vec<String>) {
+fn said(cx: &Cx<'_>, source: ImprintSource, wide: bool) -> (String, Color32, Vec<String>) {
     let state = cx.state;
     if let Some((text, color, details)) = step_text(cx, source) {
         return (text, color, vec![details]);
@@ -110,7 +112,13 @@ fn said(cx: &Cx<'_>, source: ImprintSource) -> (String, Color32, Vec<String>) {
             details.push(format!("{}, {}", pose_details(pose), pose_time(pose)));
             if let Some(truth) = results::truth(state) {
                 let off = PoseDifference::between(pose.grasp_from_object, truth);
-                text += &format!(" · {}", difference("off by", "", off));
+                let both = difference("off by", "", off);
+                if wide {
+                    text += &format!(" · {both}");
+                } else {
+                    text += &format!(" · off by {}", units::text_deg(off.angle_rad));
+                    details.push(both);
+                }
                 details.extend(pose.truth_rad.map(|truth| format!("true angle {}", units::text_deg(truth))));
             }
             if let Some(verdict) = pose.verdict.as_ref().filter(|verdict| verdict.grade > Grade::Good) {
