@@ -6,8 +6,8 @@
 >>> result.pose.matrix, result.pose.sigma, result.verdict
 
 Lengths are meters and angles radians; images are (fingers, height, width), right finger first, in the cameras' own
-orientation; poses are float64 matrices that map columns, named `dst_from_src`. Everything is computed by the functions
-behind the studio and its command line, so the numbers are the same to the last bit.
+orientation; poses are float64 matrices for column vectors, named `dst_from_src`. The package calls the functions behind the
+studio and its command line, so results are identical to the last bit.
 """
 
 from . import _native
@@ -48,7 +48,7 @@ __all__ = [
 ]
 
 
-# How the classes pickle: by what they were made of, so that another process reads the data itself.
+# Classes pickle as references to their source, so that another process reads the data itself.
 
 
 def _dataset(path, read_as, tool_unit, names):

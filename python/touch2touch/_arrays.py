@@ -1,4 +1,4 @@
-"""A folder of pictures from arrays, whatever container they came from."""
+"""Writes arrays, from any container, as a folder of pictures."""
 
 import csv
 import json
@@ -41,10 +41,10 @@ def _rig(color, depth, px_per_mm):
 def from_arrays(color, reference, depth=None, *, out, names=None, tool=None, finger=None, px_per_mm=None, rig=None):
     """Writes touches as a folder of pictures with `rig.json`, which the studio, every verb and `open` read, and opens it.
 
-    `color`: (N, height, width, 3), touched, red, green, blue, 0..255. `reference`: untouched, one picture or N. `depth`: (N, h,
-    w) meters that the membrane or gel is pushed in, NaN where nothing was measured, as the camera's picture lies. `out`: a new
-    folder. `names`, `tool`, `finger`: a name for each touch, or one tool for all; CAD models then go into `out/tools_stls`.
-    `px_per_mm`: pixels per mm on the touched surface, (color, depth); of pictures as large as the lab's it may be left out.
+    `color`: (N, height, width, 3), in contact, red, green, blue, 0..255. `reference`: without contact, one picture or N. `depth`:
+    (N, h, w), deflection of the membrane or gel in meters, NaN where not measured, in the camera's orientation. `out`: a new
+    folder. `names`, `tool`, `finger`: one value per touch, `tool` and `finger` also one for all; put CAD models into
+    `out/tools_stls`. `px_per_mm`: pixels per mm on the contact surface, (color, depth); optional for pictures of the lab's size.
     `rig`: the content of `rig.json` as a dictionary instead.
     """
     color, reference = _pictures("color", color), _pictures("reference", reference)

@@ -1,4 +1,4 @@
-"""Short ways to what is asked for most, made of the functions of `_native`."""
+"""Shortcuts for common tasks, built on `_native`."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from ._native import Recipe, estimate, estimate_many
 
 
 def predict(pair, recipe=None):
-    """The imprint that the Soft Bubbles would have felt: (2, 140, 175) float32, meters."""
+    """The predicted imprint of both Soft Bubbles: (2, 140, 175) float32, meters."""
     return estimate(pair, recipe or Recipe("predicted"), stage="imprint").imprint
 
 
@@ -19,7 +19,7 @@ def predict_many(pairs, recipe=None, *, progress=None):
 def table(scores, *, paper=False):
     """The rows of an evaluation as a list of dictionaries, one for each method and group: `pandas.DataFrame(table(scores))`.
 
-    A figure with an interval has it in `NAME_low` and `NAME_high`.
+    Confidence intervals are in `NAME_low` and `NAME_high`.
     """
     answer, rows = scores.json(paper=paper), []
     for row in answer["rows"] + answer.get("published", []):

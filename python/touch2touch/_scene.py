@@ -1,4 +1,4 @@
-"""What a notebook shows: a 3D view that turns, and a table that sorts. HTML that holds all it needs, without a server."""
+"""Notebook output: an interactive 3D view and a sortable table, as self-contained HTML without a server."""
 
 import base64
 import html
@@ -93,7 +93,7 @@ for (const head of document.querySelectorAll("th")) head.onclick = () => {
 
 
 def _frame(page, height):
-    """A page in a frame of its own: nothing of it touches the notebook."""
+    """A page in an iframe, isolated from the notebook."""
     return f'<iframe srcdoc="{html.escape(page)}" style="width:100%;height:{height}px;border:0" sandbox="allow-scripts"></iframe>'
 
 
@@ -104,7 +104,7 @@ def _numbers(values, kind="<i2"):
 
 
 def _coarser(vertices, faces):
-    """A mesh of few enough triangles: corners that are near each other become one."""
+    """A mesh with few enough triangles, by merging nearby vertices."""
     size = np.ptp(vertices, axis=0).max() if len(vertices) else 0
     cells = 400
     while len(faces) > _MOST_TRIANGLES or len(vertices) > 65535:
@@ -148,7 +148,7 @@ _GRAY, _BLUE, _RED, _GREEN = [150, 150, 155], [90, 130, 200], [200, 30, 110], [6
 
 
 def _view(pair, imprint, points, pose):
-    """The page of a pair or result; `None` where nothing of it has a place in space."""
+    """The page of a pair or result; `None` if it has no 3D content."""
     solids, clouds, legend = [], [], []
     for matrix, color, text in ((pair.truth, _GREEN, "true pose"), (pose, _BLUE, "pose")):
         # The true pose only where there is no other.
@@ -195,7 +195,7 @@ def estimate_html(result, source, pngs):
 
 
 def scores_html(scores):
-    """The rows of an evaluation as a table that sorts by a click on a head."""
+    """The rows of an evaluation as a table that sorts by a click on a column header."""
     rows = table(scores)
     keys = [key for key in dict.fromkeys(key for row in rows for key in row) if not key.endswith(("_low", "_high"))]
     keys = [key for key in keys if any(isinstance(row.get(key), (str, int, float)) and row.get(key) is not False for row in rows)]

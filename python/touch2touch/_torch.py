@@ -1,8 +1,8 @@
-"""A map-style data set as PyTorch's `DataLoader` takes it, without PyTorch."""
+"""A map-style data set for PyTorch's `DataLoader`, without a dependency on PyTorch."""
 
 
 class MapDataset:
-    """Items by number: a dictionary of arrays, named as the properties of `Pair`. Workers open the data themselves."""
+    """Items are dictionaries of arrays, named like the properties of `Pair`. Workers open the data themselves."""
 
     def __init__(self, data, fields):
         self.data, self.fields = data, tuple(fields)

@@ -1,14 +1,13 @@
-"""Many pairs on many machines: Ray does the spreading, the functions are this package's.
+"""Processes many pairs on many machines with Ray.
 
 `pip install touch2touch[ray]`, then
 
 >>> import touch2touch as t2t, touch2touch.ray
 >>> touch2touch.ray.evaluate(t2t.open("/data/lab"), t2t.Recipe("predicted"), out="rows")
 
-writes a row for each touch as Parquet into a folder that all machines see: identity of pair and recipe, pose, deviations,
-verdict, error where the truth is known, and each finger's measures against the measured imprint. A touch whose row is there is
-not felt again, so a run that was stopped, or that lost a worker, goes on where it was; rows are the same to the last bit
-whoever makes them.
+writes one row per touch as Parquet into a folder that all machines share: identity of pair and recipe, pose, standard deviations,
+verdict, error where the truth is known, and each finger's metrics against the measured imprint. Existing rows are skipped, so a run
+that was stopped, or that lost a worker, resumes; rows are identical to the last bit on any machine.
 """
 
 import hashlib
@@ -22,12 +21,12 @@ from . import Dataset, Recipe, Refused, estimate, psnr, ssim
 
 # One thread for each worker: there are as many workers as cores.
 THREADS = {"RAYON_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
-# Range of a row's structural similarities, meters: no row knows the other predictions of its tool.
+# Data range of SSIM, meters: fixed, because a row does not know the other predictions of its tool.
 RANGE_M = 0.0225
 
 
 def row(pair, recipe, identity):
-    """The figures of a touch, as a dictionary of plain values; NaN where there is none. What fails says why, and is a row too."""
+    """The results of a touch as a dictionary of plain values, NaN where missing. A failed touch is also a row, with the reason in `why`."""
     nan = float("nan")
     found = {"pair": pair.name, "tool": pair.tool_name, "recipe": identity, "angle_rad": nan, "y_m": nan, "z_m": nan,
              "angle_sd_rad": nan, "y_sd_m": nan, "z_sd_m": nan, "verdict": None, "why": None, "error_rad": nan,
@@ -60,7 +59,7 @@ def part(out, identity, names):
 
 
 def write(file, rows):
-    """Writes rows as Parquet, whole or not at all."""
+    """Writes rows as Parquet, completely or not at all."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -79,7 +78,7 @@ def schema(pa):
 
 
 def known(out, identity):
-    """Names of the pairs whose rows by this recipe are in a folder."""
+    """Names of the pairs that have rows of this recipe in a folder."""
     import pyarrow.parquet as pq
 
     names = set()
@@ -98,14 +97,14 @@ class Worker:
     def __call__(self, batch):
         names = [str(name) for name in batch["pair"]]
         file = part(self.out, self.identity, names)
-        # A batch that is made again after its worker was lost may be there already.
+        # A batch repeated after its worker was lost may already be written.
         if not file.exists():
             write(file, [row(self.data[name], self.recipe, self.identity) for name in names])
         return {"pairs": np.array([len(names)])}
 
 
 def evaluate(data, recipe=None, out="rows", *, batch=16, workers=None):
-    """Rows of all touches of a data set in `out`, made where they are missing. The folder, and how many were made.
+    """Writes the missing rows of a data set's touches to `out`. Returns the folder and the number of new rows.
 
     `data` must be at the same path on every machine. `workers`: actors at a time (default: one for each core of the cluster).
     """
@@ -120,7 +119,7 @@ def evaluate(data, recipe=None, out="rows", *, batch=16, workers=None):
         return out, 0
     ray.init(ignore_reinit_error=True, runtime_env={"env_vars": THREADS}, log_to_driver=False)
     workers = workers or max(1, int(ray.cluster_resources().get("CPU", 1)))
-    # Blocks of one batch each, so that what a lost worker had in hand is all that is made again.
+    # Blocks of one batch each, so that a lost worker costs only its current batch.
     blocks = ray.data.from_items([{"pair": name} for name in todo], override_num_blocks=-(-len(todo) // batch))
     made = blocks.map_batches(Worker, batch_size=batch, fn_constructor_args=(data, recipe, str(out)), num_cpus=1,
                               compute=ray.data.ActorPoolStrategy(size=workers), max_restarts=-1, max_task_retries=-1)
@@ -128,13 +127,13 @@ def evaluate(data, recipe=None, out="rows", *, batch=16, workers=None):
 
 
 def main():
-    """`python -m touch2touch.ray DATA OUT [--predicted]`: the same without Ray, for one machine or a share of a job array."""
+    """`python -m touch2touch.ray DATA OUT [--predicted]`: writes the rows without Ray, on one machine or as part of a job array."""
     import argparse
 
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("data")
     parser.add_argument("out", type=Path)
-    parser.add_argument("--predicted", action="store_true", help="feel predictions, not the measured imprints")
+    parser.add_argument("--predicted", action="store_true", help="evaluate predicted instead of measured imprints")
     parser.add_argument("--shard", default="1/1", metavar="I/N", help="every N-th batch from the I-th on, counted from 1")
     parser.add_argument("--batch", type=int, default=16)
     args = parser.parse_args()
