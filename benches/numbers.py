@@ -302,7 +302,7 @@ def engine(found, name):
     return next(row for row in found["engines"] if row["name"] == name)
 
 
-KINDS = {"spoilt": "spoilt as a learned mask is", "clean": "clean", "threshold=5": "all deeper than 5 mm",
+KINDS = {"spoilt": "degraded like a learned mask", "clean": "clean", "threshold=5": "all deeper than 5 mm",
          "threshold=2.5": "all deeper than 2.5 mm", "unet": "by the shipped mask model"}
 
 
@@ -335,7 +335,7 @@ FAULTS = {"wrong_unit": "model in another unit", "mirrored": "model mirrored", "
 def verdict_table(found):
     """Faults by what the verdict calls them."""
     words = {"own": "built-in simulator", "predicted": "the same simulator, predicted imprints", "spoilt": "independent simulator",
-             "unet": "that one, masks by the shipped model"}
+             "unet": "independent simulator, masks by the shipped model"}
     sources = [s for s in words if s in found]
     rows = []
     for at, fault in enumerate(found["own"]["faults"]):
@@ -344,16 +344,16 @@ def verdict_table(found):
     named = "; ".join(f"{words[s]} {found[s]['named']:.1f} %" for s in sources)
     trials = ", ".join(f"{words[s]}: {found[s]['faults'][0]['trials']}" for s in sources)
     return "\n\n".join([markdown(["fault", *(words[s] for s in sources)], rows),
-                        f"*Check* or *wrong* (of these, *wrong*). The first row are false alarms, of right poses alone. Grasps: {trials}. "
+                        f"*Check* or *wrong* (of these, *wrong*). The first row shows false alarms, over correct poses only. Grasps: {trials}. "
                         f"With every tool tried, the own one comes first: {named}."])
 
 
 def doctor_table(found):
-    return (f"{found['spoilt_sets']} data sets of {found['pairs']} pairs, stored wrongly in {found['ways']} ways: "
-            f"{100 * found['named_share']:.1f} % named rightly and nothing else, {100 * found['noticed_share']:.1f} % noticed. "
-            f"{found['near_sets']} slightly off in {found['near_ways']} ways: of {found['near_noticed']} something is said, of "
-            f"{found['near_sets'] - found['near_named']} something wrong. {found['sound_sets']} sound ones: {found['false_alarms']} false "
-            f"alarms. {found['worsened']} sets are worse when they are read as was said.")
+    return (f"{found['spoilt_sets']} data sets of {found['pairs']} pairs, each stored wrongly in one of {found['ways']} ways: "
+            f"{100 * found['named_share']:.1f} % identified with no other finding, {100 * found['noticed_share']:.1f} % detected. "
+            f"{found['near_sets']} slightly off in {found['near_ways']} ways: {found['near_noticed']} reported, "
+            f"{found['near_sets'] - found['near_named']} wrongly. {found['sound_sets']} sound ones: {found['false_alarms']} false "
+            f"alarms. {found['worsened']} sets got worse by the fix that was suggested.")
 
 
 ENGINES = {"ort": "ONNX Runtime", "rten": "built-in engine"}
@@ -462,10 +462,10 @@ STEPS = (
     Step("real", "Real pairs: the shipped generator, and fitted to them", real, real_table, ("real",)),
     Step("front", "Error against time of a prediction", front, front_table),
     Step("registration", "Error against time of every registration", registration, registration_table),
-    Step("masks", "Registration by the contact mask that it is given", masks, masks_table),
-    Step("verdict", "The verdict as a detector of faults", verdict, verdict_table),
-    Step("doctor", "Data stored wrongly, and told from sound ones", doctor, doctor_table),
-    Step("trials", "What a robot would do with the poses", trials, trials_table),
+    Step("masks", "Registration by kind of contact mask", masks, masks_table),
+    Step("verdict", "The verdict as a fault detector", verdict, verdict_table),
+    Step("doctor", "Wrongly stored data", doctor, doctor_table),
+    Step("trials", "Robot tasks executed with the poses", trials, trials_table),
 )
 
 
