@@ -16,6 +16,7 @@ use touch2touch_core::ambiguity::ambiguity;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::manual::AcceptedPose;
 use touch2touch_core::pose::{Registration, ToolModel};
+use touch2touch_core::which_tool::in_words;
 use touch2touch_pipeline::doubts;
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::io::dataset::SourceKind;
@@ -176,6 +177,7 @@ fn pose_cases(args: &PoseArgs, asked: &PairInput<'_>, models: &Models) -> anyhow
             name: name.to_owned(),
             registration: by.to_string(),
             imprint: imprint.key(),
+            which_tool: ranked.as_deref().map(in_words),
             tools: ranked.map(|all| all.iter().map(RankedTool::new).collect()),
             mask: contact.made_of(),
             mask_notes: contact.notes(&sample.rig),

@@ -3,12 +3,16 @@
 use crate::align::{AlignReport, Ask, Contacts, Register};
 use crate::pose::register_with;
 use crate::tool::ToolModel;
+use crate::verdict::{Grade, Verdict};
 
 /// Penalty of a pose in which no gripper holds a tool: more than any likeness makes up for.
 const NOT_HELD: f64 = 5.0;
 /// Difference of two costs at which the cheaper tool is taken for `e` times as likely. From fresh grasps under two laws, on
 /// which the right tool was ahead of the next one by 0.1 to 2.
 const TELLING: f64 = 0.1;
+/// Chance from which a tool is named as possible, and from which it is called sure.
+const POSSIBLE: f64 = 0.05;
+const SURE: f64 = 0.95;
 
 /// Candidate for the tool of a touch.
 #[derive(Clone, Debug)]
@@ -52,6 +56,17 @@ pub fn which_tool<'t>(
     all
 }
 
+/// The answer in words: `pattern_36 (sure)`, `pattern_36 or pattern_35`, or `none of these 5 tools fits`.
+pub fn in_words(ranked: &[Candidate]) -> String {
+    let fits = |one: &&Candidate| Verdict::of(&one.report).is_none_or(|verdict| verdict.grade < Grade::Wrong);
+    let likely: Vec<&Candidate> = ranked.iter().filter(fits).filter(|one| one.chance >= POSSIBLE).collect();
+    match &likely[..] {
+        [] => format!("none of these {} tools fits", ranked.len()),
+        [one] if one.chance >= SURE => format!("{} (sure)", one.tool),
+        several => several.iter().map(|one| one.tool.as_str()).collect::<Vec<_>>().join(" or "),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -89,9 +104,10 @@ mod tests {
                 "{:?}",
                 all.iter().map(|c| (&c.tool, c.cost)).collect::<Vec<_>>()
             );
+            assert!(in_words(&all).starts_with(&tools()[own].name), "{}", in_words(&all));
             assert!(all[0].chance > 0.6 && (all.iter().map(|c| c.chance).sum::<f64>() - 1.0).abs() < 1e-9);
         }
         let nothing = which_tool(Contacts::default(), [], &JointConfig::default());
-        assert!(nothing.is_empty());
+        assert!(nothing.is_empty() && in_words(&nothing) == "none of these 0 tools fits");
     }
 }

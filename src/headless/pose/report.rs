@@ -24,6 +24,9 @@ pub(super) struct PoseRow {
     /// With `--tool any`: all tools that can be aligned, the likeliest first; the pose is that one's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) tools: Option<Vec<RankedTool>>,
+    /// With `--tool any`: the answer in words.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) which_tool: Option<String>,
     /// Bases of the masks: the source's key, `hand` where one was drawn, `depth` where the mask model found nothing,
     /// `flat` where the imprint is flat; of both fingers (right, left) where they differ.
     pub(super) mask: String,
@@ -206,6 +209,7 @@ pub(super) fn text(report: &Report) -> String {
             c.mask,
             c.stop
         );
+        text.extend(c.which_tool.iter().map(|words| format!("    tool: {words}\n")));
         for ranked in c.tools.iter().flatten().take(3) {
             text += &format!("    {:>3.0} % {}\n", 100.0 * ranked.chance, ranked.tool);
         }

@@ -17,6 +17,7 @@ use touch2touch_core::postprocess::Severity;
 use touch2touch_core::sample::Scale;
 use touch2touch_core::units;
 use touch2touch_core::verdict::Grade;
+use touch2touch_core::which_tool::in_words;
 use touch2touch_pipeline::labels::ImprintOf;
 use touch2touch_pipeline::steps::pose::PoseResult;
 
@@ -54,6 +55,7 @@ fn pair(cx: &Cx<'_>, ui: &mut Ui) {
 fn tools(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, pose: &PoseResult) {
     match results::ranking(cx.state, source) {
         Some(Lookup::Ready(all)) => {
+            ui.label(RichText::new(format!("Tool: {}", in_words(all))).size(SMALL).color(cx.p.strong));
             let own = results::tool_name(cx.state).unwrap_or_default();
             for candidate in all.iter().take(3) {
                 let text = format!("{:3.0} %  {}", 100.0 * candidate.chance, candidate.tool);
