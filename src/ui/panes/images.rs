@@ -496,11 +496,6 @@ fn captions(cx: &Cx<'_>, output: &CanvasOutput, pane: Pane, finger: PadId) {
     let text = finger_text(cx.state, finger);
     output.caption(Align2::LEFT_BOTTOM, &source_note(cx.state), crate::ui::parts::theme::DARK.caution);
     output.caption(Align2::LEFT_TOP, &text, cx.p.strong_on_image());
-    if let Some(warning) =
-        results::ambiguity(cx.state, finger).and_then(|a| a.caption()).filter(|_| pane == Pane::Predicted)
-    {
-        output.caption(Align2::RIGHT_BOTTOM, warning, crate::ui::parts::theme::DARK.caution);
-    }
 }
 
 /// The value under the pointer, in millimeters.
