@@ -36,7 +36,7 @@ use serde::{Deserialize, Serialize};
 use super::frames::PlanarPose;
 
 pub use joint::{Basis, Elsewhere, Evidence, JointConfig, JointFit, MaskWeight, MembraneEvidence, PoseAnswer};
-pub use lab_icp::{LabIcpConfig, LabModel, PaperTrap, lab_icp, lab_starts};
+pub use lab_icp::{LabIcpConfig, LabModel, lab_icp};
 pub(crate) use observability::DEGENERATE_BELOW;
 pub use observability::{Observability, observability};
 pub use planar::align;
@@ -464,6 +464,38 @@ pub struct AlignReport {
 }
 
 impl AlignReport {
+    /// A report of `runs` about `used` points, with the inliers of the winner and the sum of their squared distances.
+    fn of(runs: Vec<Run>, winner: usize, rung: Rung, used: usize, (inliers, squares): (usize, f64)) -> Self {
+        let Run { start, end, stop, .. } = runs[winner];
+        Self {
+            grasp_from_object: end,
+            converged: stop.converged(),
+            stop,
+            start,
+            winner,
+            rung,
+            ladder: Vec::new(),
+            certificate: None,
+            iterations: runs.iter().map(|run| run.iterations).sum(),
+            lookups: 0,
+            offered: 0,
+            not_finite: 0,
+            used,
+            inlier_share: inliers as f64 / used.max(1) as f64,
+            inlier_rms_m: (squares / (inliers as f64).max(1.0)).sqrt(),
+            within_prior: false,
+            observability: None,
+            joint: None,
+            evidence: None,
+            answers: Vec::new(),
+            ends: Vec::new(),
+            range: Range::default(),
+            trace: Vec::new(),
+            fits: Vec::new(),
+            runs,
+        }
+    }
+
     /// The angle as the lab reports it: the rotation of `object_from_grasp`, radians.
     pub fn lab_angle_rad(&self) -> f64 {
         self.grasp_from_object.inverse().theta_rad

@@ -19,7 +19,7 @@ use super::search::{Progress, Search};
 use super::uncertainty::Uncertainty;
 use super::{
     AlignConfig, AlignError, AlignReport, Certificate, Fate, MIN_POINTS, MIN_SHARE, Observability, Outcome, PointFit,
-    Prior, REACH_M, Range, Run, Rung, RungAttempt, clean,
+    Prior, REACH_M, Run, Rung, RungAttempt, clean,
 };
 use crate::field::DistanceField;
 use crate::frames::PlanarPose;
@@ -373,46 +373,26 @@ impl<'a> Problem<'a> {
         let runs = &answer.runs;
         let told = || Uncertainty::of_mask(points_yz, self.field, answer.pose);
         let pose = config.prior.slid_in(answer.pose, told);
+        let run = |(run, start): (&Progress, &PlanarPose)| {
+            let last = run.merged_into.map_or(run, |other| &runs[other]);
+            let end = last.state.to_pose(c);
+            let (iterations, stop) = (run.iterations, run.stop);
+            Run { requested: *start, start: *start, end, cost_m2: last.cost, iterations, stop }
+        };
+        let ended = runs.iter().zip(&answer.starts).map(run).collect();
+        let inliers = (best.inliers, best.inlier_squares);
         AlignReport {
             grasp_from_object: pose,
-            converged: best.stop.converged(),
-            stop: best.stop,
-            start: answer.starts[answer.winner],
-            runs: runs
-                .iter()
-                .zip(&answer.starts)
-                .map(|(run, start)| {
-                    let last = run.merged_into.map_or(run, |other| &runs[other]);
-                    Run {
-                        requested: *start,
-                        start: *start,
-                        end: last.state.to_pose(c),
-                        cost_m2: last.cost,
-                        iterations: run.iterations,
-                        stop: run.stop,
-                    }
-                })
-                .collect(),
-            winner: answer.winner,
-            rung: answer.rung,
             ladder,
             certificate: answer.certificate,
-            iterations: runs.iter().map(|r| r.iterations).sum(),
             lookups: answer.lookups,
             offered: points_yz.len(),
             not_finite: self.not_finite,
-            used: self.points.len(),
-            inlier_share: answer.inlier_share,
-            inlier_rms_m: (best.inlier_squares / (best.inliers as f64).max(1.0)).sqrt(),
             within_prior: config.prior.allows(pose),
             observability: Some(answer.seen),
-            joint: None,
-            evidence: None,
-            answers: Vec::new(),
-            ends: Vec::new(),
-            range: Range::default(),
             trace: answer.trace,
             fits: if config.record { fits(points_yz, self.field, pose, config.final_kernel_m()) } else { Vec::new() },
+            ..AlignReport::of(ended, answer.winner, answer.rung, self.points.len(), inliers)
         }
     }
 }

@@ -490,32 +490,20 @@ impl<'a> Problem<'a> {
         let runs: Vec<Run> = answer.runs.iter().zip(&answer.starts).map(run).collect();
         let fits =
             if config.record { fits(points_yz, &self.tool.field, pose, config.mask_kernels_m[1]) } else { Vec::new() };
+        let inliers = (best.inliers, best.inlier_squares);
         AlignReport {
             grasp_from_object: pose,
-            converged: best.stop.converged(),
-            stop: best.stop,
-            start: answer.starts[answer.winner],
-            winner: answer.winner,
-            rung: answer.rung,
-            ladder: Vec::new(),
-            certificate: None,
-            iterations: runs.iter().map(|run| run.iterations).sum(),
             lookups: answer.lookups,
             offered: points_yz.len(),
             not_finite: self.not_finite,
-            used: answer.points,
-            inlier_share: best.inliers as f64 / answer.points.max(1) as f64,
-            inlier_rms_m: (best.inlier_squares / (best.inliers as f64).max(1.0)).sqrt(),
             within_prior: config.allows(pose),
             observability: seen,
             joint: Some(answer.fit),
-            evidence: None,
-            answers: Vec::new(),
             ends: answer.ends.iter().map(|at| (at.state.to_pose(self.centroid), at.cost)).collect(),
             range: config.range,
             trace: answer.trace,
             fits,
-            runs,
+            ..AlignReport::of(runs, answer.winner, answer.rung, answer.points, inliers)
         }
     }
 }
