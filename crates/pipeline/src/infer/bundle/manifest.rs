@@ -11,7 +11,7 @@ use super::sensor::{SensorPair, SensorSpec};
 use super::{FileEntry, Problems, Role};
 use touch2touch_core::diffusion::{GUIDANCE, GenerateConfig, Prediction, Sampler, Schedule, ScheduleError, Spacing};
 use touch2touch_core::postprocess::{
-    ColorChain, DepthChain, DepthRange, Mapping, PostprocessError, Reduction, Shift, ShiftMode, ShiftStats,
+    ColorChain, DepthChain, DepthRange, PostprocessError, Reduction, Shift, ShiftMode, ShiftStats,
 };
 use touch2touch_core::resample::Resampling;
 use touch2touch_core::rig::{Sensor, SensorKind, lab, share};
@@ -98,7 +98,6 @@ impl GeneratorSpec {
     pub fn depth_chain(&self, mode: ShiftMode) -> Result<DepthChain, PostprocessError> {
         let chain = DepthChain {
             range: self.output.range_m.ok_or(PostprocessError::NotDepth)?,
-            mapping: Mapping::Correct,
             reduction: self.output.reduction,
             shift: Shift::None,
             correction: None,
