@@ -134,7 +134,6 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
         sampler: config.sampler.key().into(),
         steps: config.steps,
         seed: config.seed,
-        guidance: config.guidance,
         notes: notes.into_list(&output),
         pairs,
     };

@@ -96,7 +96,6 @@ pub(super) struct Report {
     pub(super) sampler: String,
     pub(super) steps: u32,
     pub(super) seed: u64,
-    pub(super) guidance: f64,
     /// Oddities of the files, by kind.
     pub(super) notes: Vec<Finding>,
 }
@@ -135,7 +134,7 @@ pub(super) fn text(report: &Report) -> String {
     );
     let mut line = |name: &str, p: &Figures, seconds: Option<f64>| {
         text += &format!(
-            "{name:<44} {:>8} {:>6} {:>12} {:>10} {:>8}{note}\n",
+            "{name:<44} {:>8} {:>6} {:>12} {:>10} {:>8}\n",
             number(p.psnr_db, 1),
             number(p.ssim, 3),
             number(p.vqvae_psnr_db, 1),

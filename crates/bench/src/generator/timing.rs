@@ -88,7 +88,6 @@ fn bare(generator: &mut Generator, images: &[Tensor], config: &GenerateConfig, s
         TimestepType::Int64 => Input::I64(&whole),
         TimestepType::Float32 => Input::F32(&float),
     };
-    debug_assert_eq!(config.guidance, 1.0, "guided runs call the denoiser twice");
     let [encoder, denoiser, decoder] = generator.graphs();
     let begin = Instant::now();
     for image in images {
@@ -109,7 +108,6 @@ pub(super) fn overhead(
     cases: &[Case],
     config: &GenerateConfig,
 ) -> anyhow::Result<Overhead> {
-    let config = GenerateConfig { guidance: 1.0, ..*config };
     let spec = generator.spec().clone();
     let steps = spec.schedule.steps(config.steps, config.spacing, spec.prediction)?.len();
     let (mut generated, mut alone) = (f64::INFINITY, f64::INFINITY);
