@@ -92,7 +92,7 @@ impl Source {
         let mean = finite().sum::<f64>() / finite().count().max(1) as f64;
         let unit = |&v: &f32| ((if v.is_finite() { f64::from(v) } else { mean } - lo) / (hi - lo)) as f32;
         let imprint = target.as_slice().iter().map(unit).collect();
-        Ok(Pair { picture: prepared.into_data(), imprint, frame, weight: 1.0 })
+        Ok(Pair { picture: prepared.into_data(), imprint, frame })
     }
 
     /// Touches of the simulator, which lie where the model expects them; none for other rigs than the simulator's.
