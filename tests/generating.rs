@@ -10,7 +10,7 @@ use touch2touch::app::services::Services;
 use touch2touch_core::diffusion::{GenerateConfig, Progress, Sampler, Spacing};
 use touch2touch_core::grid::{Grid, RgbGrid};
 use touch2touch_core::postprocess::RawPrediction;
-use touch2touch_pipeline::infer::bundle::{Bundle, MANIFEST};
+use touch2touch_pipeline::infer::bundle::Bundle;
 use touch2touch_pipeline::infer::engine::EngineChoice;
 use touch2touch_pipeline::infer::generator::{GenerateError, Generator, Item, Observer};
 use touch2touch_pipeline::job::JobCx;
@@ -19,20 +19,6 @@ use touch2touch_pipeline::steps::models::{GenerateInput, Models};
 
 fn fixture() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles/generator")
-}
-
-/// The tiny bundle with another manifest.
-fn with_manifest(change: impl FnOnce(&mut serde_json::Value)) -> tempfile::TempDir {
-    let dir = tempfile::tempdir().unwrap();
-    for entry in std::fs::read_dir(fixture()).unwrap() {
-        let path = entry.unwrap().path();
-        std::fs::copy(&path, dir.path().join(path.file_name().unwrap())).unwrap();
-    }
-    let path = dir.path().join(MANIFEST);
-    let mut manifest = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
-    change(&mut manifest);
-    std::fs::write(path, manifest.to_string()).unwrap();
-    dir
 }
 
 fn open(dir: &Path) -> Generator {

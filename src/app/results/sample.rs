@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use super::super::jobs::{Job, Worker};
-use super::super::keys::{PairKey, ThumbnailKey, TouchKey};
+use super::super::keys::{PairKey, ThumbnailKey};
 use super::super::pane::Demand;
-use super::super::results::{self, Computes, Demands};
+use super::super::results::{Computes, Demands};
 use super::super::services::Services;
 use super::super::state::{Absent, Lookup, State};
 use touch2touch_core::dataset::PairId;

@@ -9,7 +9,6 @@ use touch2touch_core::findings::Finding;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::manual::AcceptedPose;
 use touch2touch_core::metrics::AngleSummary;
-use touch2touch_core::rig::PerPad;
 use touch2touch_core::units::angle_error;
 use touch2touch_core::verdict::{Grade, Verdict};
 use touch2touch_core::which_tool::Candidate;

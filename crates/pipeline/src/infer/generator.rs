@@ -71,7 +71,6 @@ pub struct Generator {
     encoder: Graph,
     denoiser: Graph,
     decoder: Graph,
-    name: String,
     /// Prepared images and their conditions, the last used last.
     encoded: Vec<(Tensor, Tensor)>,
 }
@@ -102,7 +101,6 @@ impl Generator {
             denoiser: load(Role::Denoiser)?,
             decoder: load(Role::Decoder)?,
             hash: bundle.hash().to_owned(),
-            name: bundle.name().to_owned(),
             encoded: Vec::new(),
             fit: bundle.fit().cloned(),
             spec,

@@ -5,7 +5,6 @@ use std::sync::Arc;
 
 use crate::error::TaskError;
 use crate::infer::bundle::{self, Bundle, BundleSpec, Ends, Misfit, Origin, SensorPair};
-use crate::infer::generator::GenerateError;
 use touch2touch_core::dataset::Problem;
 use touch2touch_core::diffusion::{GenerateConfig, Sampler};
 use touch2touch_core::fit::FitSource;
