@@ -357,7 +357,7 @@ def doctor_table(found):
 
 
 ENGINES = {"ort": "ONNX Runtime", "rten": "built-in engine"}
-SAMPLERS = {"ddim": "DDIM", "ddpm": "DDPM", "dpm_solver2m": "DPM-Solver++(2M)"}
+SAMPLERS = {"ddim": "DDIM", "ddpm": "DDPM"}
 # Numbers of steps of the table; the result has them all.
 STEPS_SHOWN = (1, 2, 10, 50, 200)
 

@@ -1,4 +1,4 @@
-//! The generator as a whole, on the tiny bundle of `tests/data/bundles`: batches, previews, guidance, what is kept on
+//! The generator as a whole, on the tiny bundle of `tests/data/bundles`: batches, previews, what is kept on
 //! the disk, and inputs that make no sense (row E22 of the list of numerical failures, from image to picture).
 
 use std::ops::ControlFlow;
@@ -10,7 +10,7 @@ use touch2touch::app::services::Services;
 use touch2touch_core::diffusion::{GenerateConfig, Progress, Sampler, Spacing};
 use touch2touch_core::grid::{Grid, RgbGrid};
 use touch2touch_core::postprocess::RawPrediction;
-use touch2touch_pipeline::infer::bundle::{Bundle, MANIFEST};
+use touch2touch_pipeline::infer::bundle::Bundle;
 use touch2touch_pipeline::infer::engine::EngineChoice;
 use touch2touch_pipeline::infer::generator::{GenerateError, Generator, Item, Observer};
 use touch2touch_pipeline::job::JobCx;
@@ -19,20 +19,6 @@ use touch2touch_pipeline::steps::models::{GenerateInput, Models};
 
 fn fixture() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles/generator")
-}
-
-/// The tiny bundle with another manifest.
-fn with_manifest(change: impl FnOnce(&mut serde_json::Value)) -> tempfile::TempDir {
-    let dir = tempfile::tempdir().unwrap();
-    for entry in std::fs::read_dir(fixture()).unwrap() {
-        let path = entry.unwrap().path();
-        std::fs::copy(&path, dir.path().join(path.file_name().unwrap())).unwrap();
-    }
-    let path = dir.path().join(MANIFEST);
-    let mut manifest = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
-    change(&mut manifest);
-    std::fs::write(path, manifest.to_string()).unwrap();
-    dir
 }
 
 fn open(dir: &Path) -> Generator {
@@ -130,43 +116,6 @@ fn previews_show_what_is_coming_and_change_nothing() {
         let mut stopped = Looker { item: 0, seen: Vec::new(), stop_at: 3 };
         let cancelled = generator.run(&[&a, &b], &items, &config, &mut stopped);
         assert!(matches!(cancelled, Err(GenerateError::Cancelled)));
-    }
-}
-
-#[test]
-fn guidance_is_what_its_formula_says_and_only_where_declared() {
-    let refused = open(&fixture()).generate(&image(0.0), &GenerateConfig { guidance: 2.0, ..config() }, &mut go_on);
-    let text = refused.unwrap_err().to_string();
-    assert!(text.contains("was not trained for guidance") && text.contains('2'), "{text}");
-
-    let blank = Grid::filled(16, 16, [0.0; 3]);
-    let plain = open(&fixture()).generate(&image(0.0), &config(), &mut go_on).unwrap();
-    let unguided = open(&fixture()).generate(&blank, &config(), &mut go_on).unwrap();
-    let dir = with_manifest(|m| m["guidance"] = serde_json::json!({"unconditional": "zero_difference", "scale": 3.0}));
-    let mut generator = open(dir.path());
-    assert_eq!(generator.spec().defaults.guidance, 3.0, "the declared scale is the default");
-    let mut guided = |guidance| generator.generate(&image(0.0), &GenerateConfig { guidance, ..config() }, &mut go_on);
-    assert_eq!(guided(1.0).unwrap(), plain, "a scale of 1 is the model alone");
-    // A scale of 0 leaves only what a GelSlim that feels nothing gives.
-    assert!(largest_difference(&guided(0.0).unwrap(), &unguided) < 1e-5);
-    assert!(largest_difference(&guided(3.0).unwrap(), &plain) > 1e-3);
-    assert!(matches!(guided(21.0), Err(GenerateError::Diffusion(_))));
-    assert!(matches!(guided(f64::NAN), Err(GenerateError::Diffusion(_))));
-    // 6 steps with a scale of 1, and 6 for each half with 0 and with 3.
-    assert_eq!(runs(&mut generator)[1], 30);
-    let other = with_manifest(|m| m["guidance"] = serde_json::json!({"unconditional": "zero_condition", "scale": 1.0}));
-    let config = GenerateConfig { guidance: 3.0, ..config() };
-    let zeros = open(other.path()).generate(&image(0.0), &config, &mut go_on).unwrap();
-    let difference = generator.generate(&image(0.0), &config, &mut go_on).unwrap();
-    assert!(largest_difference(&zeros, &difference) > 1e-4, "no condition is not the condition of nothing");
-    for (guidance, problem) in [
-        (serde_json::json!({"unconditional": "zero_condition", "scale": 99}), "guidance.scale: out of range"),
-        (serde_json::json!({"unconditional": "noise", "scale": 2}), "guidance: unknown variant"),
-        (serde_json::json!({"scale": 2}), "guidance: missing field"),
-    ] {
-        let dir = with_manifest(|m| m["guidance"] = guidance);
-        let text = Bundle::open(dir.path()).unwrap_err().to_string();
-        assert!(text.contains(problem), "{text}");
     }
 }
 

@@ -359,7 +359,7 @@ def parser():
     parser.add_argument("--average-with", help="generator bundle that the run began from (`--from`); its weights are mixed in")
     parser.add_argument("--share", type=float, default=0.5, help="the run's own share of that mixture")
     parser.add_argument("--steps", type=int, default=10, help="default sampling steps of a diffusion bundle")
-    parser.add_argument("--sampler", default="ddim", help="its default sampler: ddim, ddpm or dpm_solver2m")
+    parser.add_argument("--sampler", default="ddim", help="its default sampler: ddim or ddpm")
     parser.add_argument("--note", default="", help="free text for the provenance")
     parser.add_argument("--seed", type=int, default=7, help="which training touches the shift statistics come from")
     return parser

@@ -93,13 +93,11 @@ def schedule(weights):
     """The manifest's schedule, from the betas in the checkpoint."""
     betas = weights.tensor("betas").double().reshape(-1)
     first, last = (float(f"{betas[i].item():.7g}") for i in (0, -1))
-    formulas = {"scaled_linear": lambda n: torch.linspace(first**0.5, last**0.5, n, dtype=torch.float64) ** 2,
-                "linear": lambda n: torch.linspace(first, last, n, dtype=torch.float64)}
-    for kind, formula in formulas.items():
-        if 0 < first <= last < 1 and torch.allclose(formula(len(betas)), betas, rtol=1e-5, atol=0):
-            return {"kind": kind, "steps": len(betas), "beta_start": first, "beta_end": last}
-    raise LabError(f"{weights.path}: betas: {len(betas)} values from {first} to {last} that are neither linear nor scaled linear; "
-                   "the app's bundles know these two (and cosine): train with one of them")
+    wanted = torch.linspace(first**0.5, last**0.5, len(betas), dtype=torch.float64) ** 2
+    if 0 < first <= last < 1 and torch.allclose(wanted, betas, rtol=1e-5, atol=0):
+        return {"kind": "scaled_linear", "steps": len(betas), "beta_start": first, "beta_end": last}
+    raise LabError(f"{weights.path}: betas: {len(betas)} values from {first} to {last} that are not scaled linear, as the lab's are; "
+                   "the app's bundles know no others: train with those")
 
 
 def shift(path):

@@ -56,9 +56,6 @@ fn selection(wants: &mut Demands<'_>) {
         if compared {
             results::want_comparison(wants, finger, pair.finger(finger));
         }
-        if on_screen && state.needs(Demand::Ambiguity) {
-            results::want_ambiguity(wants, finger, pair.finger(finger));
-        }
     }
     let drawn = state.settings.mask_visible || state.needs(Demand::Masks);
     for (cloud, pose, source) in

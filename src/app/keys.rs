@@ -46,8 +46,6 @@ named! {
     StoredKey(TouchKey);
     /// The picture beside a touch.
     PictureKey(TouchKey);
-    /// The ambiguity of the GelSlim image of a touch.
-    AmbiguityKey(TouchKey);
     /// A prediction of a color sensor, as a picture.
     ColorKey(PredictionKey);
     /// Implausible things about the way of a prediction to meters.

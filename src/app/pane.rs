@@ -78,8 +78,6 @@ pub enum Demand {
     Masks,
     /// The prediction against the measurement.
     Comparison,
-    /// The ambiguity of the GelSlim image.
-    Ambiguity,
     /// Implausible things about a prediction's way to meters.
     Flags,
     /// Any two imprints against each other.
@@ -105,7 +103,7 @@ macro_rules! panes {
                 at [Inspect Left, Align Left, Label Left, Evaluate Left, Adapt Left]
             } }
             metrics { Metrics {
-                "Metrics", "Pose and image scores of this pair", Form, needs [Comparison, Ambiguity, Flags, Poses],
+                "Metrics", "Pose and image scores of this pair", Form, needs [Comparison, Flags, Poses],
                 at [Inspect Right(2), Align Right(2), Label Right(2), Evaluate Right(1), Adapt Right(1)]
             } }
             generate { Generate {
@@ -128,7 +126,7 @@ macro_rules! panes {
                 }
                 Predicted {
                     "Predicted imprint", "What the generator predicts from the GelSlim image, in the same colors",
-                    Imprint(Predicted), needs [Imprint(Predicted), Ambiguity],
+                    Imprint(Predicted), needs [Imprint(Predicted)],
                     at [Inspect Top(3), Align Top(2), Label Top(1), Evaluate Bottom(2), Adapt Bottom(2)]
                 }
             }
@@ -205,7 +203,7 @@ macro_rules! define {
             pub fn needs(self) -> &'static [Demand] {
                 use ImprintSource::{Measured, Predicted};
                 use Demand::{
-                    Ambiguity, Compare, Comparison, Flags, Imprint, Masks, Pair, Poses, Scene,
+                    Compare, Comparison, Flags, Imprint, Masks, Pair, Poses, Scene,
                     Steps, Thumbnails, Training,
                 };
                 match self { $($( Self::$pane => &[$($need),*], )*)* }

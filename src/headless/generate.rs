@@ -14,7 +14,6 @@ use super::output::says;
 use super::recipe::{ModelArgs, misgiving};
 use super::report::{RunReport, output_stems};
 use super::{Common, Output, VerbResult};
-use touch2touch_core::ambiguity::ambiguity;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::grid::{DepthMap, RgbGrid};
 use touch2touch_core::postprocess::ShiftMode;
@@ -100,8 +99,7 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
                 let key = sample.rig.pad_key(finger);
                 let stem = with_ending(&stem, &format!("_{key}"));
                 let (seconds, kept) = (predicted.seconds, predicted.kept);
-                let ambiguity = touch.color().and_then(|g| ambiguity(&g.difference));
-                let mut pair = Pair { name: name.clone(), finger: key, ambiguity, seconds, kept, ..Pair::default() };
+                let mut pair = Pair { name: name.clone(), finger: key, seconds, kept, ..Pair::default() };
                 if let Some(difference) = imprint::color(&predicted, [0, 0])? {
                     unit = Unit::Levels;
                     write_color(&stem, &difference)?;
@@ -136,7 +134,6 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
         sampler: config.sampler.key().into(),
         steps: config.steps,
         seed: config.seed,
-        guidance: config.guidance,
         notes: notes.into_list(&output),
         pairs,
     };

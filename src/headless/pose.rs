@@ -12,7 +12,6 @@ use super::output::says;
 use super::recipe::misgiving;
 use super::{Output, VerbResult};
 use touch2touch_core::align::{AlignReport, Ask};
-use touch2touch_core::ambiguity::ambiguity;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::manual::AcceptedPose;
 use touch2touch_core::pose::{Registration, ToolModel};
@@ -154,12 +153,6 @@ fn pose_cases(args: &PoseArgs, asked: &PairInput<'_>, models: &Models) -> anyhow
     let estimate = estimate(touch, recipe, Stage::Cloud, models, &JobCx::unwatched())?;
     let contact = estimate.contact();
     let truth = sample.grasp_from_object;
-    let predicted = imprint == ImprintSource::Predicted;
-    // What was measured is as it is; what was predicted may have had nothing to go by.
-    let left_open = predicted.then(|| {
-        let left_open = |f| ambiguity(&sample.pad(f)?.color()?.difference);
-        sample.rig.pads().map(left_open).collect()
-    });
     let one = |&by: &Registration| {
         let ranked = match touch.tool {
             Ok(_) => None,
@@ -195,7 +188,6 @@ fn pose_cases(args: &PoseArgs, asked: &PairInput<'_>, models: &Models) -> anyhow
             accepted: accepted.map(|a| Accepted::new(a, truth.map(|truth| truth.inverse().theta_rad))),
             // The evidence stands beside it.
             report: found.ok().filter(|_| args.trace).map(|found| AlignReport { evidence: None, ..found.report }),
-            ambiguity: left_open.clone(),
         })
     };
     args.registration.all()?.iter().map(one).collect()

@@ -71,7 +71,6 @@ impl ModelArgs {
             eta: self.eta,
             sampler: self.sampler,
             spacing: self.spacing,
-            guidance: self.guidance,
             shift: self.mapping.shift.clone(),
             ..GeneratorChoice::default()
         }

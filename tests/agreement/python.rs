@@ -38,7 +38,7 @@ fn keywords(recipe: &Recipe) -> Value {
     let mask = recipe.mask;
     let mut all = json!({
         "imprint": recipe.imprint.key(), "bundle": path(model), "steps": config.steps, "seed": config.seed, "eta": config.eta,
-        "sampler": config.sampler.key(), "guidance": config.guidance, "mask": mask.source.key(),
+        "sampler": config.sampler.key(), "mask": mask.source.key(),
         "threshold_mm": number(mask.threshold_m), "probability": mask.probability, "top_percent": mask.top_percent,
         "cad_mm": number(mask.cad_distance_m), "hand": recipe.hand, "engine": recipe.registration.to_string(),
         "runtime": "rten", "mask_bundle": recipe.mask_model.as_ref().map(path),

@@ -36,9 +36,8 @@ fn model(name: &str) -> Model {
 fn config() -> impl Strategy<Value = GenerateConfig> {
     let sampler = prop_oneof![Just(Sampler::Ddim), Just(Sampler::Ddpm)];
     let spacing = prop_oneof![Just(Spacing::Lab), Just(Spacing::Trailing)];
-    (1u32..1000, 0.0..=1.0f64, any::<u64>(), sampler, spacing).prop_map(|(steps, eta, seed, sampler, spacing)| {
-        GenerateConfig { steps, eta, seed, sampler, spacing, guidance: 1.0 }
-    })
+    (1u32..1000, 0.0..=1.0f64, any::<u64>(), sampler, spacing)
+        .prop_map(|(steps, eta, seed, sampler, spacing)| GenerateConfig { steps, eta, seed, sampler, spacing })
 }
 
 fn shift() -> impl Strategy<Value = ShiftMode> {
@@ -114,9 +113,9 @@ proptest! {
 
 /// Puts a recipe in force in the studio.
 pub(super) fn put(studio: &mut Studio, recipe: &Recipe) {
-    let GenerateConfig { steps, eta, seed, sampler, spacing, guidance } = recipe.generator.as_ref().unwrap().1;
+    let GenerateConfig { steps, eta, seed, sampler, spacing } = recipe.generator.as_ref().unwrap().1;
     let before = studio.state.settings.clone();
-    let generate = GenerateSettings { preset: None, steps, eta, seed, sampler, spacing, guidance, ..before.generate };
+    let generate = GenerateSettings { preset: None, steps, eta, seed, sampler, spacing, ..before.generate };
     let (shift, mask, registration) = (recipe.shift, recipe.mask, recipe.registration);
     let change = prefer(move |s| {
         s.runtime = EngineChoice::Rten;

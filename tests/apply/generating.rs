@@ -195,9 +195,9 @@ fn presets_follow_the_bundle_and_own_numbers_leave_them() {
 }
 
 #[test]
-fn guidance_is_only_asked_of_a_bundle_that_was_trained_for_it() {
-    let defaults = GenerateConfig { guidance: 2.5, spacing: Spacing::Lab, ..GenerateConfig::default() };
-    let bundle = |guided| BundleInfo {
+fn a_bundles_own_numbers_can_be_spelt_out() {
+    let defaults = GenerateConfig { spacing: Spacing::Lab, ..GenerateConfig::default() };
+    let bundle = BundleInfo {
         id: "x".into(),
         name: "x".into(),
         kind: BundleKind::Generator,
@@ -206,17 +206,13 @@ fn guidance_is_only_asked_of_a_bundle_that_was_trained_for_it() {
             fit: None,
             defaults,
             training_steps: 1000,
-            guided,
             sensors: SensorPair::of(&lab::GELSLIM, &lab::BUBBLE),
         }),
         trained: false,
     };
-    let own = GenerateSettings { preset: None, guidance: 4.0, sampler: Sampler::Ddpm, ..GenerateSettings::default() };
-    assert_eq!(own.config(&bundle(true)).guidance, 4.0);
-    assert_eq!(own.config(&bundle(false)).guidance, 1.0);
-    let preset = GenerateSettings::default();
-    assert_eq!(preset.config(&bundle(true)).guidance, 2.5);
-    assert_eq!(preset.spelt_out(Some(&bundle(true))).spacing, Spacing::Lab);
-    let wild = GenerateSettings { guidance: f64::NAN, preview_every: u32::MAX, ..own }.validated();
-    assert_eq!((wild.guidance, wild.preview_every), (1.0, 1000));
+    let own = GenerateSettings { preset: None, sampler: Sampler::Ddpm, ..GenerateSettings::default() };
+    assert_eq!(own.config(&bundle).spacing, Spacing::Trailing);
+    assert_eq!(GenerateSettings::default().spelt_out(Some(&bundle)).spacing, Spacing::Lab);
+    let wild = GenerateSettings { eta: f64::NAN, preview_every: u32::MAX, ..own }.validated();
+    assert_eq!((wild.eta, wild.preview_every), (0.0, 1000));
 }

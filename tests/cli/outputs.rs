@@ -67,7 +67,7 @@ fn pairs_that_look_alike_have_files_of_their_own_and_the_report_says_whether_it_
     assert!(!std::fs::symlink_metadata(&report).unwrap().is_symlink());
 
     // A run that is refused leaves the last one's report as it is.
-    let refused = run(&[&args[..], &["--guidance", "2"]].concat(), dir.path());
+    let refused = run(&[&args[..], &["--shift", "refit:/nowhere.json"]].concat(), dir.path());
     assert_eq!(refused.status.code(), Some(2));
     assert!(std::fs::read(&report).unwrap() == written);
 }

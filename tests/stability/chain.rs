@@ -6,15 +6,14 @@ use rand_chacha::ChaCha8Rng;
 use touch2touch_core::grid::Grid;
 use touch2touch_core::moments::Moments;
 use touch2touch_core::postprocess::{
-    DepthChain, DepthRange, FlagKind, Mapping, RawPrediction, Reduction, RefitShift, Shift, ShiftFit, ShiftMode,
-    ShiftStats, Stats, flags,
+    DepthChain, DepthRange, FlagKind, RawPrediction, Reduction, RefitShift, Shift, ShiftFit, ShiftMode, ShiftStats,
+    Stats, flags,
 };
 use touch2touch_core::resample::Resampling;
 
 fn chain() -> DepthChain {
     DepthChain {
         range: DepthRange { min_m: -0.0116, max_m: 0.0225 },
-        mapping: Mapping::Doubled,
         reduction: Reduction::Mean,
         shift: Shift::None,
         correction: None,

@@ -231,7 +231,6 @@ fn name(config: &GenerateConfig, engine: EngineKind, several: bool) -> String {
     let sampler = match config.sampler {
         Sampler::Ddim => "DDIM",
         Sampler::Ddpm => "DDPM",
-        Sampler::DpmSolver2m => "DPM++2M",
     };
     let lab = if config.spacing == Spacing::Lab { " lab" } else { "" };
     let engine = if several { format!(" {}", EngineChoice::from(engine).key()) } else { String::new() };

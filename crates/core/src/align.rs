@@ -35,8 +35,8 @@ use serde::{Deserialize, Serialize};
 
 use super::frames::PlanarPose;
 
-pub use joint::{Basis, Elsewhere, Evidence, JointConfig, JointFit, MaskWeight, MembraneEvidence, PoseAnswer};
-pub use lab_icp::{LabIcpConfig, LabModel, PaperTrap, lab_icp, lab_starts};
+pub use joint::{Basis, Elsewhere, Evidence, JointConfig, JointFit, MembraneEvidence, PoseAnswer};
+pub use lab_icp::{LabIcpConfig, LabModel, lab_icp};
 pub(crate) use observability::DEGENERATE_BELOW;
 pub use observability::{Observability, observability};
 pub use planar::align;
@@ -57,28 +57,18 @@ const REACH_M: f64 = 0.012;
 const MIN_SHARE: f64 = 0.05;
 
 /// Settings of [`align`]. The default is what the product uses.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct AlignConfig {
     /// Poses to start from, `grasp_from_object`: exactly these, and no ladder. Empty: the ladder chooses.
     pub starts: Vec<PlanarPose>,
     /// Rungs that the ladder may use, cheapest first. With one alone, its answer is taken as it is.
     pub rungs: Vec<Rung>,
-    /// Tests that an answer must pass for the ladder to stop.
-    pub accept: Accept,
-    /// Points used for the answer; more are thinned evenly.
-    pub points: usize,
-    /// Points used to rank the starts.
-    pub scout_points: usize,
     /// Widths of the Geman-McClure kernel, meters, wide to narrow. The last one decides.
     pub kernels_m: Vec<f64>,
     /// Most steps per kernel width and start.
     pub max_iterations: usize,
-    /// Best starts that are refined with all points.
-    pub keep: usize,
     /// Look-ups after which a proof is given up.
     pub budget: usize,
-    /// Share of the cost by which an answer may miss the best and still count as proved.
-    pub gap: f64,
     /// Box where the pose is expected: the ladder searches it, and the report says whether the answer was found there.
     pub prior: Prior,
     /// Keep per-iteration states and per-point residuals.
@@ -97,47 +87,17 @@ impl Default for AlignConfig {
         Self {
             starts: Vec::new(),
             rungs: vec![Rung::Single, Rung::Several, Rung::Grid, Rung::Certified],
-            accept: Accept::default(),
-            points: 2048,
-            scout_points: 128,
             kernels_m: vec![8e-3, 2e-3, 1e-3],
             max_iterations: 20,
-            keep: 2,
             budget: 30_000_000,
-            gap: 0.02,
             prior: Prior::default(),
             record: false,
         }
     }
 }
 
-/// Tests that an answer must pass to be believed without further search. Costs are shares of the squared kernel width,
-/// so 0 to 1.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Accept {
-    /// Greatest cost per point after one start.
-    pub cost: f64,
-    /// Smallest share of points within the kernel's width after one start.
-    pub inliers: f64,
-    /// Greatest cost when several starts or a grid agree on the answer: then it is the mask that is bad, not the
-    /// search.
-    pub cost_searched: f64,
-    /// Smallest share of points within the kernel's width in that case.
-    pub inliers_searched: f64,
-    /// Smallest eigenvalue of [`Observability`].
-    pub weakest: f64,
-}
-
-impl Default for Accept {
-    /// On spoilt masks, right answers cost 0.005 to 0.24 and keep 78 to 100 % of their points; wrong minima cost at
-    /// least 0.29 and keep at most 68 %.
-    fn default() -> Self {
-        Self { cost: 0.2, inliers: 0.8, cost_searched: 0.26, inliers_searched: 0.72, weakest: DEGENERATE_BELOW }
-    }
-}
-
 /// The box around zero in which the gripper can hold a tool.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prior {
     /// Largest size of the angle, radians.
     pub theta_rad: f64,
@@ -464,6 +424,38 @@ pub struct AlignReport {
 }
 
 impl AlignReport {
+    /// A report of `runs` about `used` points, with the inliers of the winner and the sum of their squared distances.
+    fn of(runs: Vec<Run>, winner: usize, rung: Rung, used: usize, (inliers, squares): (usize, f64)) -> Self {
+        let Run { start, end, stop, .. } = runs[winner];
+        Self {
+            grasp_from_object: end,
+            converged: stop.converged(),
+            stop,
+            start,
+            winner,
+            rung,
+            ladder: Vec::new(),
+            certificate: None,
+            iterations: runs.iter().map(|run| run.iterations).sum(),
+            lookups: 0,
+            offered: 0,
+            not_finite: 0,
+            used,
+            inlier_share: inliers as f64 / used.max(1) as f64,
+            inlier_rms_m: (squares / (inliers as f64).max(1.0)).sqrt(),
+            within_prior: false,
+            observability: None,
+            joint: None,
+            evidence: None,
+            answers: Vec::new(),
+            ends: Vec::new(),
+            range: Range::default(),
+            trace: Vec::new(),
+            fits: Vec::new(),
+            runs,
+        }
+    }
+
     /// The angle as the lab reports it: the rotation of `object_from_grasp`, radians.
     pub fn lab_angle_rad(&self) -> f64 {
         self.grasp_from_object.inverse().theta_rad

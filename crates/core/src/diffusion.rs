@@ -9,7 +9,6 @@
 
 mod ddim;
 mod denoiser;
-mod guidance;
 mod noise;
 mod preset;
 mod schedule;
@@ -18,7 +17,6 @@ mod watch;
 
 pub use ddim::{DiffusionError, GenerateConfig, Sampler, sample};
 pub use denoiser::{Denoiser, ModelError, Prediction};
-pub use guidance::{GUIDANCE, Guided};
 pub use noise::GaussianNoise;
 pub use preset::Preset;
 pub use schedule::{Schedule, ScheduleError, Spacing, Step};

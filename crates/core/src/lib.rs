@@ -4,7 +4,6 @@
 //! a thread or a clock. Values come in as arguments and go out as results, in meters and radians.
 
 pub mod align;
-pub mod ambiguity;
 pub mod bits;
 pub mod blur;
 pub mod catalog;

@@ -6,7 +6,6 @@ mod angle;
 mod color;
 mod frechet;
 mod image;
-mod line;
 mod ssim;
 mod unstretched;
 
@@ -14,6 +13,5 @@ pub use angle::AngleSummary;
 pub use color::{LEVELS, color, planes};
 pub use frechet::frechet_distance;
 pub use image::{MetricError, mse, psnr, unit_range};
-pub use line::{Line, line};
 pub use ssim::{SsimRange, ssim};
 pub use unstretched::{Unstretched, unstretched};

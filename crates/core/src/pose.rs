@@ -126,7 +126,7 @@ impl Registration {
     /// The registration with the settings that the product uses, apart from the gate.
     pub fn method(self) -> Box<dyn Register> {
         match self {
-            Self::Joint(range) => Box::new(JointConfig { range, ..JointConfig::default() }),
+            Self::Joint(range) => Box::new(JointConfig { range }),
             Self::DistanceField(gate) => {
                 let mut config = AlignConfig::default();
                 if let Some(gate) = gate {

@@ -42,17 +42,7 @@ pub enum Reduction {
     Luma,
 }
 
-/// Mapping of the decoder's [-1, 1] to meters.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Mapping {
-    /// `(v + 1) / 2 · (max - min) + min`.
-    Correct,
-    /// The released script's: the same formula applied to `(v + 1) / 2`, which gives `(depth + max) / 2`.
-    Doubled,
-}
-
-/// Means and deviations for the paper's shift, meters. `pred` is of values mapped with [`Mapping::Doubled`].
+/// Means and deviations for the paper's shift, meters. `pred` is of values in meters before the shift.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ShiftStats {
@@ -73,7 +63,7 @@ pub enum Shift {
     None,
     /// `(d - pred_mean) / pred_std · gt_std + gt_mean`. Where `pred_std` is (relatively) zero only the mean is moved.
     PaperMeanStd(ShiftStats),
-    /// `2·d - max`: undoes [`Mapping::Doubled`] exactly.
+    /// `2·d - max`: undoes the second mapping exactly.
     ExactInverse,
 }
 
@@ -189,8 +179,6 @@ pub enum PostprocessError {
 pub struct DepthChain {
     /// Depths that -1 and 1 stand for. Values outside are clamped, as the lab does.
     pub range: DepthRange,
-    /// Mapping to meters.
-    pub mapping: Mapping,
     /// Reduction of the channels to one.
     pub reduction: Reduction,
     /// Shift of the meters.
@@ -238,7 +226,6 @@ impl DepthChain {
     /// # Errors
     /// [`PostprocessError::NoStatistics`] for [`ShiftMode::PaperShift`] without `stats`.
     pub fn with_mode(mut self, mode: ShiftMode, stats: Option<ShiftStats>) -> Result<Self, PostprocessError> {
-        self.mapping = Mapping::Doubled;
         self.shift = match mode {
             ShiftMode::Raw => Shift::None,
             ShiftMode::PaperShift => Shift::PaperMeanStd(stats.ok_or(PostprocessError::NoStatistics)?),
@@ -299,8 +286,8 @@ impl DepthChain {
         let DepthRange { min_m, max_m } = self.range;
         combine(&raw.channels, weights, |v| {
             let unit = (f64::from(v).clamp(-1.0, 1.0) + 1.0) / 2.0;
-            let unit = if self.mapping == Mapping::Doubled { (unit + 1.0) / 2.0 } else { unit };
-            unit * (max_m - min_m) + min_m
+            // Mapped twice, as the released script does.
+            (unit + 1.0) / 2.0 * (max_m - min_m) + min_m
         })
     }
 

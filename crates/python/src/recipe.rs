@@ -20,7 +20,7 @@ use crate::process::{failed, refused};
 ///
 /// Choices that are not said are as the verbs have them. `imprint`: "measured" or "predicted". `bundle`, `mask_bundle`: folders of model
 /// bundles (default: the shipped ones). `preset`: "fast", "default" or "sharp", of which `steps`, `seed`, `eta`, `sampler`,
-/// `spacing`, `guidance` change single numbers. `shift`: the mapping to meters, "exact" with `fit_parts` (a list of "offset",
+/// `spacing` change single numbers. `shift`: the mapping to meters, "exact" with `fit_parts` (a list of "offset",
 /// "field", "gain", "response"), "paper", "raw", or "refit" with `stats`, a file of `touch2touch stats`. `mask`: "auto", "unet",
 /// "threshold", "top_percent", "cad" or "truth", with `threshold_mm`, `probability`, `top_percent`, `cad_mm`. `engine`: the
 /// registration, such as "joint" or "distance_field:gate=1.5". `hand`: masks drawn by hand win.
@@ -156,7 +156,6 @@ impl Recipe {
             eta: left.take("eta")?,
             sampler: left.one_of("sampler", Sampler::iter().map(|sampler| (sampler.into(), sampler)))?,
             spacing: left.one_of("spacing", Spacing::iter().map(|spacing| (spacing.into(), spacing)))?,
-            guidance: left.take("guidance")?,
             shift: left.shift()?,
         };
         let mask_bundle: Option<PathBuf> = left.take("mask_bundle")?;

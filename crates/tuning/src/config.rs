@@ -24,12 +24,6 @@ pub struct Config {
     /// Pull of the networks' weights toward where they began: what was learned in simulation is forgotten less. Up to 30 it
     /// costs the sensor nothing that was measurable, 100 a little, for twice the effect.
     pub anchor: f32,
-    /// Steps of rising rates.
-    pub warm_up: usize,
-    /// Share of the rates that is left at the end.
-    pub rest: f32,
-    /// Longest gradient.
-    pub clip: f32,
     /// Share of the steps with a second denoising step.
     pub second: f64,
     /// Share of simulated pairs in a batch, where there are pairs of both kinds. An eighth keeps what the bundle knows of
@@ -53,9 +47,6 @@ impl Default for Config {
             field_rate: 2e-3,
             decay: 0.01,
             anchor: 10.0,
-            warm_up: 10,
-            rest: 0.02,
-            clip: 1.0,
             second: 0.3,
             simulated: 0.125,
             augment: Augment::default(),

@@ -1,14 +1,13 @@
 //! Fixtures that tests share: a tiny generator with random weights, and touches with a known placement.
 
 use crate::augment::Augment;
-use crate::closed_form::Placement;
 use crate::config::Config;
 use crate::image;
 use crate::nets::Layout;
 use crate::nets::generator::Sizes;
 use crate::pair::Pair;
 use crate::random::{Purpose, Random};
-use crate::tuner::{NoiseSchedule, Sampler, Start};
+use crate::tuner::{NoiseSchedule, Placement, Sampler, Start};
 
 pub(crate) fn random(seed: u64) -> Random {
     Random::new(seed, Purpose::Variation, 0, 0)
@@ -83,8 +82,13 @@ pub(crate) fn start() -> Start {
         std: [0.5, 0.7, 0.6],
         range_m: [-0.02, 0.03],
         unit_m: [-0.006, 0.018],
-        placement: Placement::identity(2, sizes.side),
+        placement: identity(2, sizes.side),
     }
+}
+
+/// Everything as the decoder draws it.
+pub(crate) fn identity(pads: usize, side: usize) -> Placement {
+    Placement { line: [1.0, 0.0], shift: vec![[0.0; 2]; pads], field: vec![vec![0.0; side * side]; pads] }
 }
 
 /// A short plan without variations, whose rates suit a tiny network.
@@ -109,7 +113,7 @@ pub(crate) fn pairs(count: usize) -> Vec<Pair> {
         let picture: Vec<f32> = (0..3).flat_map(|_| image::blurred(&random.normals(side * side), side, 1.5)).collect();
         let imprint = image::blurred(&picture[..side * side], side, 2.0).iter().map(|v| 0.3 + 0.5 * v).collect();
         let frame = if 3 * i >= 2 * count { None } else { Some(i % 2) };
-        Pair { picture, imprint, frame, weight: 1.0 }
+        Pair { picture, imprint, frame }
     };
     (0..count).map(make).collect()
 }

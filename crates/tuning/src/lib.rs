@@ -14,7 +14,6 @@
 //! in the last digits.
 
 mod augment;
-mod closed_form;
 mod config;
 mod error;
 mod image;
@@ -33,13 +32,12 @@ pub mod trainer;
 mod tuner;
 
 pub use augment::Augment;
-pub use closed_form::Placement;
 pub use config::Config;
 pub use error::{Error, Result};
 pub use masks::{Cast, MaskConfig, MaskStart, MaskTouch, MaskTuner, Sensors};
 pub use pair::Pair;
 pub use trainer::Descent;
-pub use tuner::{NoiseSchedule, Query, Sampler, Start, Tuned, Tuner};
+pub use tuner::{NoiseSchedule, Placement, Query, Sampler, Start, Tuned, Tuner};
 
 #[cfg(test)]
 mod fixture;

@@ -8,12 +8,12 @@ use crate::error::{Error, Result};
 use crate::nets::mask::{self, MASK};
 use crate::onnx::Onnx;
 use crate::ops;
-use crate::optim::{Ramp, Rate};
+use crate::optim::Rate;
 use crate::params::{Leaves, Params};
 use crate::random::{Purpose, Random, dealt};
 use crate::state::{Origin, OriginBuilder};
 use crate::tape::Tensor;
-use crate::trainer::{Descent, Objective, PARTS, Plan, StepReport, Trainer, threads};
+use crate::trainer::{Descent, Objective, PARTS, StepReport, Trainer};
 
 /// A mask network as its bundle describes it: where tuning begins.
 #[derive(Clone, Debug)]
@@ -67,6 +67,9 @@ pub struct MaskTouch {
     pub predicted: bool,
 }
 
+/// Pull of the weights toward zero.
+const DECAY: f32 = 0.01;
+
 /// Settings of the tuning of a mask network. The defaults are for some twenty masks and ten minutes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MaskConfig {
@@ -78,16 +81,6 @@ pub struct MaskConfig {
     pub seed: u64,
     /// Rate of the weights.
     pub rate: f32,
-    /// Pull of the weights toward zero.
-    pub decay: f32,
-    /// Pull of the weights toward where they began.
-    pub anchor: f32,
-    /// Steps of rising rates.
-    pub warm_up: usize,
-    /// Share of the rates that is left at the end.
-    pub rest: f32,
-    /// Longest gradient.
-    pub clip: f32,
     /// Other sensors that the imprints are varied to.
     pub sensors: Sensors,
     /// Threads; `None` for as many as there are cores, four at most. The result does not depend on it.
@@ -96,19 +89,7 @@ pub struct MaskConfig {
 
 impl Default for MaskConfig {
     fn default() -> Self {
-        Self {
-            steps: 300,
-            batch: 8,
-            seed: 42,
-            rate: 6e-4,
-            decay: 0.01,
-            anchor: 0.0,
-            warm_up: 10,
-            rest: 0.02,
-            clip: 1.0,
-            sensors: Sensors::default(),
-            threads: None,
-        }
+        Self { steps: 300, batch: 8, seed: 42, rate: 6e-4, sensors: Sensors::default(), threads: None }
     }
 }
 
@@ -133,8 +114,7 @@ impl Objective for Recipe {
     type Part = Part;
 
     fn rate(&self, _: &str) -> Option<Rate> {
-        let c = &self.config;
-        (c.rate > 0.0).then_some(Rate { rate: c.rate, decay: c.decay, anchor: c.anchor })
+        Some(Rate { rate: self.config.rate, decay: DECAY, anchor: 0.0 })
     }
 
     fn parts(&self, _: usize) -> usize {
@@ -181,12 +161,13 @@ pub struct MaskTuner {
 }
 
 impl MaskTuner {
-    /// Before the first step.
+    /// Before the first step, or where the run stood that [`Descent::to_bytes`] kept as `state`: to the last bit as if it had
+    /// not been stopped.
     ///
     /// # Errors
     /// If the network is of another architecture (which weight says so), a setting is out of range, there are no touches,
-    /// or one cannot be learned from (which one).
-    pub fn new(start: &MaskStart, touches: Vec<MaskTouch>, config: MaskConfig) -> Result<Self> {
+    /// one cannot be learned from (which one), or the state is damaged or of another start, other touches or other settings.
+    pub fn new(start: &MaskStart, touches: Vec<MaskTouch>, config: MaskConfig, state: Option<&[u8]>) -> Result<Self> {
         if config.steps == 0 {
             return Err(Error::Start { what: "steps", why: "there must be one or more".into() });
         }
@@ -200,21 +181,12 @@ impl MaskTuner {
         let params = mask::read(&file)?;
         check(&touches, start.size)?;
         let origin = origin(start, &touches, &config);
-        let ramp = Ramp { warm_up: config.warm_up, steps: config.steps, rest: config.rest };
-        let plan = Plan { ramp, clip: config.clip, threads: threads(config.threads) };
+        let (steps, threads) = (config.steps, config.threads);
         let start = MaskStart { file: Vec::new(), ..start.clone() };
         let recipe = Recipe { start, all: (0..touches.len()).collect(), touches, config };
-        Ok(Self { file, origin, trainer: Trainer::new(recipe, params, plan) })
-    }
-
-    /// Goes on with a run that [`Descent::to_bytes`] kept; to the last bit as if it had not been stopped.
-    ///
-    /// # Errors
-    /// As [`MaskTuner::new`], and if the state is damaged or of another start, other touches or other settings.
-    pub fn resume(start: &MaskStart, touches: Vec<MaskTouch>, config: MaskConfig, state: &[u8]) -> Result<Self> {
-        let mut tuner = Self::new(start, touches, config)?;
-        tuner.trainer.restore(tuner.origin, state)?;
-        Ok(tuner)
+        let mut trainer = Trainer::new(recipe, params, steps, threads);
+        state.map_or(Ok(()), |state| trainer.restore(origin, state))?;
+        Ok(Self { file, origin, trainer })
     }
 
     /// The network's ONNX file as it is now (the running mean of the weights), as long as before.
@@ -270,7 +242,7 @@ impl Descent for MaskTuner {
     }
 
     fn steps(&self) -> usize {
-        self.trainer.objective.config.steps
+        self.trainer.steps
     }
 
     fn to_bytes(&self) -> Vec<u8> {

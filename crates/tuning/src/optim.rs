@@ -1,4 +1,4 @@
-//! [`AdamW`]: the optimizer, with the gradient clipped over all weights; [`Ramp`]: how its rates change;
+//! [`AdamW`]: the optimizer, with the gradient clipped over all weights; [`ramp`]: how its rates change;
 //! [`Average`]: the running mean of the weights.
 
 use std::sync::Arc;
@@ -16,24 +16,18 @@ pub(crate) struct Rate {
     pub anchor: f32,
 }
 
-/// Rates over time: a linear rise, then half a cosine down to a rest.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ramp {
-    /// Steps of the rise.
-    pub warm_up: usize,
-    /// All steps.
-    pub steps: usize,
-    /// Share of the rates that is left at the end.
-    pub rest: f32,
-}
+/// Steps of rising rates.
+const WARM_UP: usize = 10;
+/// Share of the rates that is left at the end.
+const REST: f32 = 0.02;
+/// Longest gradient.
+const CLIP: f32 = 1.0;
 
-impl Ramp {
-    /// The factor of all rates at a step, counted from 0.
-    pub fn factor(&self, step: usize) -> f32 {
-        let rise = ((step + 1) as f32 / self.warm_up.max(1) as f32).min(1.0);
-        let done = step as f32 / self.steps.max(1) as f32;
-        rise * (self.rest + (1.0 - self.rest) * (1.0 + (std::f32::consts::PI * done).cos()) / 2.0)
-    }
+/// Factor of all rates at a step of a plan, counted from 0: a linear rise, then half a cosine down to a rest.
+pub(crate) fn ramp(step: usize, steps: usize) -> f32 {
+    let rise = ((step + 1) as f32 / WARM_UP as f32).min(1.0);
+    let done = step as f32 / steps.max(1) as f32;
+    rise * (REST + (1.0 - REST) * (1.0 + (std::f32::consts::PI * done).cos()) / 2.0)
 }
 
 /// AdamW over plain vectors. Moments exist for what is trained.
@@ -61,7 +55,7 @@ impl AdamW {
         Self { moments: moments.collect(), steps: 0 }
     }
 
-    /// One step against the gradient, which is shortened to a length of `clip` over all arrays. All rates are multiplied
+    /// One step against the gradient, which is shortened to a length of [`CLIP`] over all arrays. All rates are multiplied
     /// by `factor`; `start` is where anchors pull to.
     pub(crate) fn step(
         &mut self,
@@ -70,9 +64,8 @@ impl AdamW {
         gradient: &[Option<Vec<f32>>],
         rates: &[Option<Rate>],
         factor: f32,
-        clip: f32,
     ) {
-        let shorten = (clip / (norm(gradient) as f32 + 1e-6)).min(1.0);
+        let shorten = (CLIP / (norm(gradient) as f32 + 1e-6)).min(1.0);
         self.steps += 1;
         let [unbias_first, unbias_second] = BETAS.map(|beta| 1.0 / (1.0 - beta.powi(self.steps as i32)));
         let arrays = params.values_mut().zip(start.entries()).zip(gradient).zip(rates).zip(&mut self.moments);
@@ -151,7 +144,7 @@ mod tests {
         let mut weights = params(&[1.0, -2.0, 5.0]);
         let (start, rates) = (weights.clone(), [Some(PLAIN), None]);
         let mut adam = AdamW::new(&weights, &rates);
-        adam.step(&mut weights, &start, &[Some(vec![0.3, -0.2, 0.0]), None], &rates, 1.0, 1.0);
+        adam.step(&mut weights, &start, &[Some(vec![0.3, -0.2, 0.0]), None], &rates, 1.0);
         let trained = &weights.entries()[0].values;
         assert!((trained[0] - 0.9).abs() < 1e-5 && (trained[1] + 1.9).abs() < 1e-5 && trained[2] == 5.0);
         assert_eq!(*weights.entries()[1].values, [3.0]);
@@ -166,7 +159,7 @@ mod tests {
             let start = weights.clone();
             let mut adam = AdamW::new(&weights, &rates);
             for k in [1.0, scale] {
-                adam.step(&mut weights, &start, &[Some(vec![3.0 * k, 4.0 * k]), None], &rates, 1.0, 1.0);
+                adam.step(&mut weights, &start, &[Some(vec![3.0 * k, 4.0 * k]), None], &rates, 1.0);
             }
             weights.entries()[0].values.to_vec()
         };
@@ -181,7 +174,7 @@ mod tests {
             let (start, mut weights) = (params(&[2.0]), params(&[4.0]));
             let mut adam = AdamW::new(&weights, &rates);
             for _ in 0..200 {
-                adam.step(&mut weights, &start, &[Some(vec![0.0]), None], &rates, 1.0, 1.0);
+                adam.step(&mut weights, &start, &[Some(vec![0.0]), None], &rates, 1.0);
             }
             assert!((weights.entries()[0].values[0] - end).abs() < 1e-4);
         }
@@ -193,20 +186,19 @@ mod tests {
         let mut weights = params(&[3.0, -2.0]);
         let start = weights.clone();
         let mut adam = AdamW::new(&weights, &rates);
-        let ramp = Ramp { warm_up: 10, steps: 300, rest: 0.02 };
         for step in 0..300 {
             let slope: Vec<f32> = weights.entries()[0].values.iter().map(|w| 2.0 * (w - 0.5)).collect();
-            adam.step(&mut weights, &start, &[Some(slope), None], &rates, ramp.factor(step), 1.0);
+            adam.step(&mut weights, &start, &[Some(slope), None], &rates, ramp(step, 300));
         }
         assert!(weights.entries()[0].values.iter().all(|w| (w - 0.5).abs() < 1e-3));
     }
 
     #[test]
     fn rates_rise_and_fall() {
-        let ramp = Ramp { warm_up: 10, steps: 50, rest: 0.02 };
-        assert!((ramp.factor(0) - 0.1).abs() < 1e-3);
-        assert!(ramp.factor(9) > 0.9 && ramp.factor(25) < 0.52 && ramp.factor(49) < 0.03);
-        assert!((10..49).all(|step| ramp.factor(step + 1) < ramp.factor(step)));
+        let factor = |step| ramp(step, 50);
+        assert!((factor(0) - 0.1).abs() < 1e-3);
+        assert!(factor(9) > 0.9 && factor(25) < 0.52 && factor(49) < 0.03);
+        assert!((10..49).all(|step| factor(step + 1) < factor(step)));
     }
 
     #[test]

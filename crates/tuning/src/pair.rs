@@ -12,8 +12,6 @@ pub struct Pair {
     pub imprint: Vec<f32>,
     /// Pad that was touched; `None` for a simulated pair, whose imprint lies where the bundle expects it.
     pub frame: Option<usize>,
-    /// Weight in the loss; 1 for an ordinary pair.
-    pub weight: f32,
 }
 
 /// Beyond this a value of a difference image or an imprint is a mistake of scale.
@@ -28,9 +26,6 @@ pub(crate) fn check(pairs: &[Pair], side: usize, pads: usize) -> Result<()> {
         if let Some(why) = fault(pair, side, pads) {
             return Err(Error::Pair { index, why });
         }
-    }
-    if pairs.iter().all(|pair| pair.weight == 0.0) {
-        return Err(Error::NoPairs);
     }
     Ok(())
 }
@@ -51,9 +46,6 @@ fn fault(pair: &Pair, side: usize, pads: usize) -> Option<String> {
     }
     if pair.frame.is_some_and(|pad| pad >= pads) {
         return Some(format!("it is of pad {}, and there are {pads}", pair.frame.unwrap_or_default()));
-    }
-    if !(pair.weight.is_finite() && (0.0..=LARGEST).contains(&pair.weight)) {
-        return Some(format!("its weight is {}", pair.weight));
     }
     None
 }

@@ -52,16 +52,6 @@ impl Params {
         self.entries.iter_mut().map(|entry| &mut entry.values)
     }
 
-    /// Number of arrays.
-    pub fn len(&self) -> usize {
-        self.entries.len()
-    }
-
-    /// True without an array.
-    pub fn is_empty(&self) -> bool {
-        self.entries.is_empty()
-    }
-
     /// The arrays as tensors; those that `trained` picks are leaves of a new tape.
     pub fn leaves(&self, trained: impl Fn(&str) -> bool) -> Leaves<'_> {
         let tape = Rc::new(Tape::default());

@@ -52,8 +52,6 @@ pub(crate) struct Part {
     pictures: Vec<f32>,
     imprints: Vec<f32>,
     pads: Vec<Option<usize>>,
-    /// Shares of the batch's loss.
-    weights: Vec<f32>,
     noise: Vec<f32>,
     /// Noise of the second step, where there is one.
     second: Option<Vec<f32>>,
@@ -92,8 +90,12 @@ impl Model {
 impl Recipe {
     pub(crate) fn new(model: Model, pairs: Vec<Pair>, config: Config) -> Self {
         let of_kind = |simulated: bool| {
-            let kind = |pair: &Pair| pair.frame.is_none() == simulated && pair.weight > 0.0;
-            pairs.iter().enumerate().filter(|(_, pair)| kind(pair)).map(|(index, _)| index).collect::<Vec<_>>()
+            pairs
+                .iter()
+                .enumerate()
+                .filter(|(_, pair)| pair.frame.is_none() == simulated)
+                .map(|(index, _)| index)
+                .collect::<Vec<_>>()
         };
         let (real, simulated) = (of_kind(false), of_kind(true));
         let means = (0..=model.pads).map(|pad| mean_imprint(&pairs, pad, &model)).collect();
@@ -152,7 +154,6 @@ impl Objective for Recipe {
     fn part(&self, step: usize, part: usize) -> Part {
         let c = &self.config;
         let drawn = self.drawn(step);
-        let sum: f32 = drawn.iter().map(|&index| self.pairs[index].weight).sum();
         let parts = self.parts(step);
         let (first, end) = (part * c.batch / parts, (part + 1) * c.batch / parts);
         let two = Random::new(c.seed, Purpose::Batch, step, 0).happens(c.second);
@@ -161,7 +162,6 @@ impl Objective for Recipe {
             pictures: Vec::new(),
             imprints: Vec::new(),
             pads: Vec::new(),
-            weights: Vec::new(),
             noise: Vec::new(),
             second: two.then(Vec::new),
         };
@@ -176,7 +176,6 @@ impl Objective for Recipe {
             items.pictures.extend(self.model.standardized(&picture));
             items.imprints.extend(imprint);
             items.pads.push(pair.frame);
-            items.weights.push(pair.weight / sum);
             let random = &mut Random::new(c.seed, Purpose::Noise, step, place);
             let zeros = random.happens(0.5);
             let noise = random.normals(latent);
@@ -200,7 +199,8 @@ impl Objective for Recipe {
             let between = ops::blend(&clean.detached(), signal as f32, &model.latents(second), noise as f32);
             clean = model.clean(leaves, &between, middle, &condition);
         }
-        ops::distance(&model.seen(leaves, &clean, &part.pads), &part.imprints, &part.weights)
+        let weights = vec![1.0 / self.config.batch as f32; part.pads.len()];
+        ops::distance(&model.seen(leaves, &clean, &part.pads), &part.imprints, &weights)
     }
 }
 

@@ -6,7 +6,7 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::error::{Error, Result};
-use crate::optim::{AdamW, Average, Ramp, Rate, norm};
+use crate::optim::{AdamW, Average, Rate, norm, ramp};
 use crate::params::{Leaves, Params};
 use crate::tape::{Tensor, backward};
 
@@ -59,22 +59,12 @@ pub struct StepReport {
     pub loss: f32,
 }
 
-/// Plan of the descent.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Plan {
-    /// Rates over time, and the number of steps.
-    pub ramp: Ramp,
-    /// Longest gradient.
-    pub clip: f32,
-    /// Threads; the result does not depend on them.
-    pub threads: usize,
-}
-
 /// Weights on their way down.
 #[derive(Debug)]
 pub(crate) struct Trainer<O> {
     pub(crate) objective: O,
-    plan: Plan,
+    /// Steps of the whole plan; the rates follow it.
+    pub(crate) steps: usize,
     rates: Vec<Option<Rate>>,
     /// The weights before the first step.
     pub(crate) start: Params,
@@ -88,12 +78,14 @@ pub(crate) struct Trainer<O> {
 type Gradient = Vec<Option<Vec<f32>>>;
 
 impl<O: Objective> Trainer<O> {
-    /// Before the first step.
-    pub(crate) fn new(objective: O, start: Params, plan: Plan) -> Self {
+    /// Before the first step. Without a number of threads, as many as there are cores; the result does not depend on it.
+    pub(crate) fn new(objective: O, start: Params, steps: usize, threads: Option<usize>) -> Self {
         let rates: Vec<Option<Rate>> = start.entries().iter().map(|entry| objective.rate(&entry.name)).collect();
         let (optimizer, average) = (AdamW::new(&start, &rates), Average::new(&start));
-        let workers = Workers::new(plan.threads);
-        Self { objective, plan, rates, params: start.clone(), start, average, optimizer, step: 0, workers }
+        let threads = threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, std::num::NonZero::get));
+        // More threads than parts of a batch would have nothing to do.
+        let workers = Workers::new(threads.clamp(1, PARTS));
+        Self { objective, steps, rates, params: start.clone(), start, average, optimizer, step: 0, workers }
     }
 
     /// The running mean of the weights: what the descent is for.
@@ -107,15 +99,15 @@ impl<O: Objective> Trainer<O> {
     /// [`Error::Done`] after the last one, and [`Error::Diverged`] where the loss is not a number. The weights are then
     /// those of the step before.
     pub(crate) fn step(&mut self) -> Result<StepReport> {
-        if self.step >= self.plan.ramp.steps {
-            return Err(Error::Done(self.plan.ramp.steps));
+        if self.step >= self.steps {
+            return Err(Error::Done(self.steps));
         }
         let (loss, gradient) = self.slope();
         if !(loss.is_finite() && norm(&gradient).is_finite()) {
             return Err(Error::Diverged { step: self.step + 1 });
         }
-        let factor = self.plan.ramp.factor(self.step);
-        self.optimizer.step(&mut self.params, &self.start, &gradient, &self.rates, factor, self.plan.clip);
+        let factor = ramp(self.step, self.steps);
+        self.optimizer.step(&mut self.params, &self.start, &gradient, &self.rates, factor);
         self.average.add(&self.params, self.step);
         self.step += 1;
         Ok(StepReport { step: self.step, loss })
@@ -129,7 +121,7 @@ impl<O: Objective> Trainer<O> {
             (loss.values()[0], leaves.gradient(backward(&loss)))
         };
         let mut results = self.workers.run(self.objective.parts(self.step), run).into_iter();
-        let Some((mut loss, mut sum)) = results.next() else { return (0.0, vec![None; self.params.len()]) };
+        let Some((mut loss, mut sum)) = results.next() else { return (0.0, vec![None; self.params.entries().len()]) };
         for (value, gradient) in results {
             loss += value;
             for (sum, part) in sum.iter_mut().zip(gradient) {
@@ -143,11 +135,6 @@ impl<O: Objective> Trainer<O> {
     pub(crate) fn side_by_side<T: Send>(&self, count: usize, act: impl Fn(usize) -> T + Sync) -> Vec<T> {
         self.workers.run(count, act)
     }
-}
-
-/// More threads than parts of a batch would have nothing to do.
-pub(crate) fn threads(asked: Option<usize>) -> usize {
-    asked.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, std::num::NonZero::get)).clamp(1, PARTS)
 }
 
 fn add(sum: &mut Option<Vec<f32>>, part: Option<Vec<f32>>) {
@@ -170,7 +157,7 @@ impl Workers {
             let builder = rayon::ThreadPoolBuilder::new().num_threads(1).thread_name(|_| "tuning".to_owned());
             builder.build().expect("the system gives another thread")
         };
-        Self { pools: (0..threads.max(1)).map(pool).collect() }
+        Self { pools: (0..threads).map(pool).collect() }
     }
 
     /// Runs the numbers below `count`, as many at a time as there are workers; results come in the order of the numbers.

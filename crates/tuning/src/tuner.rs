@@ -1,17 +1,15 @@
 //! [`Tuner`]: tunes a generator on pairs, step by step.
 
-use crate::closed_form::{Compared, Placement};
 use crate::config::Config;
 use crate::error::{Error, Result};
 use crate::nets::generator::{self, DECODER, DENOISER, ENCODER, Files, Schedule};
 use crate::onnx::Onnx;
-use crate::optim::Ramp;
 use crate::pair::{self, Pair};
 use crate::params::{Leaves, Params};
 use crate::random::Random;
 use crate::recipe::{FIELD, LINE, Model, Recipe, SHIFT};
 use crate::state::{Origin, OriginBuilder};
-use crate::trainer::{Descent, Plan, StepReport, Trainer, threads};
+use crate::trainer::{Descent, StepReport, Trainer};
 
 /// A generator as its bundle describes it, and where tuning begins.
 #[derive(Clone, Debug)]
@@ -60,6 +58,17 @@ pub struct Sampler {
     pub seed: u64,
 }
 
+/// Placement behind the decoder: where each pad's sensor looks, and what it has of its own.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Placement {
+    /// Factor and offset of the decoder's picture, in units.
+    pub line: [f32; 2],
+    /// By pad: how far its imprint lies from the decoder's picture, rows and columns, pixels.
+    pub shift: Vec<[f32; 2]>,
+    /// By pad: what its imprints have beside the touch, `side` × `side`, in units.
+    pub field: Vec<Vec<f32>>,
+}
+
 /// The tuned generator.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tuned {
@@ -87,32 +96,24 @@ pub struct Tuner {
 }
 
 impl Tuner {
-    /// Before the first step.
+    /// Before the first step, or where the run stood that [`Descent::to_bytes`] kept as `state`: to the last bit as if it had
+    /// not been stopped.
     ///
     /// # Errors
     /// If the bundle is of another architecture (which weight says so), if a setting is out of range, if there are no
-    /// pairs, or if a pair cannot be learned from (which one).
-    pub fn new(start: &Start, pairs: Vec<Pair>, config: Config) -> Result<Self> {
+    /// pairs, if a pair cannot be learned from (which one), or if the state is damaged or of another start, other pairs or
+    /// other settings.
+    pub fn new(start: &Start, pairs: Vec<Pair>, config: Config, state: Option<&[u8]>) -> Result<Self> {
         if config.steps == 0 {
             return Err(Error::Start { what: "steps", why: "there must be one or more".into() });
         }
         let Opened { files, model, params } = open(start)?;
         pair::check(&pairs, model.sizes.side, model.pads)?;
         let origin = origin(start, &pairs, &config);
-        let ramp = Ramp { warm_up: config.warm_up, steps: config.steps, rest: config.rest };
-        let plan = Plan { ramp, clip: config.clip, threads: threads(config.threads) };
-        let trainer = Trainer::new(Recipe::new(model, pairs, config), params, plan);
+        let (steps, threads) = (config.steps, config.threads);
+        let mut trainer = Trainer::new(Recipe::new(model, pairs, config), params, steps, threads);
+        state.map_or(Ok(()), |state| trainer.restore(origin, state))?;
         Ok(Self { files, sampler: start.sampler, origin, trainer })
-    }
-
-    /// Goes on with a run that [`Descent::to_bytes`] kept; to the last bit as if it had not been stopped.
-    ///
-    /// # Errors
-    /// As [`Tuner::new`], and if the state is damaged or of another start, other pairs or other settings.
-    pub fn resume(start: &Start, pairs: Vec<Pair>, config: Config, state: &[u8]) -> Result<Self> {
-        let mut tuner = Self::new(start, pairs, config)?;
-        tuner.trainer.restore(tuner.origin, state)?;
-        Ok(tuner)
     }
 
     /// The generator as it is now: the running mean of the weights.
@@ -156,34 +157,11 @@ impl Descent for Tuner {
     }
 
     fn steps(&self) -> usize {
-        self.trainer.objective.config.steps
+        self.trainer.steps
     }
 
     fn to_bytes(&self) -> Vec<u8> {
         self.trainer.to_bytes(self.origin)
-    }
-}
-
-impl Placement {
-    /// The placement that a start's own predictions ask for, without any training: a search for each pad's shift, a line
-    /// by least squares, and the mean of what is left by pad. Simulated pairs are not looked at, nor is the placement in
-    /// `start`.
-    ///
-    /// # Errors
-    /// As [`Tuner::new`].
-    pub fn closed_form(start: &Start, pairs: &[Pair]) -> Result<Self> {
-        let (pads, side) = (start.placement.shift.len(), open(start)?.model.sizes.side);
-        let plain = Start { placement: Self::identity(pads, side), ..start.clone() };
-        let tuner = Tuner::new(&plain, pairs.to_vec(), Config::default())?;
-        let real: Vec<(&Pair, usize)> = pairs.iter().filter_map(|pair| Some((pair, pair.frame?))).collect();
-        let queries: Vec<Query<'_>> = real.iter().map(|(pair, _)| (pair.picture.as_slice(), None)).collect();
-        let predicted = tuner.predict(&queries)?;
-        let compared = real.iter().zip(predicted).map(|(&(pair, pad), predicted)| Compared {
-            pad,
-            predicted,
-            measured: pair.imprint.clone(),
-        });
-        Ok(Self::fitted(pads, side, &compared.collect::<Vec<_>>()))
     }
 }
 
@@ -252,9 +230,8 @@ fn origin(start: &Start, pairs: &[Pair], config: &Config) -> Origin {
     let told = (start.schedule, start.mean, start.std, start.range_m, start.unit_m, &start.placement);
     let files = OriginBuilder::default().bytes(&start.encoder).bytes(&start.denoiser).bytes(&start.decoder);
     let begun = files.told(&told).told(&Config { threads: None, ..config.clone() });
-    let pair = |origin: OriginBuilder, pair: &Pair| {
-        origin.numbers(&pair.picture).numbers(&pair.imprint).told(&(pair.frame, pair.weight))
-    };
+    let pair =
+        |origin: OriginBuilder, pair: &Pair| origin.numbers(&pair.picture).numbers(&pair.imprint).told(&pair.frame);
     pairs.iter().fold(begun, pair).finish()
 }
 

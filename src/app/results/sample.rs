@@ -1,14 +1,13 @@
-//! The tensors of a pair, its small picture, and what its GelSlim images leave open.
+//! The tensors of a pair, and its small picture.
 
 use std::sync::Arc;
 
 use super::super::jobs::{Job, Worker};
-use super::super::keys::{AmbiguityKey, PairKey, ThumbnailKey, TouchKey};
+use super::super::keys::{PairKey, ThumbnailKey};
 use super::super::pane::Demand;
-use super::super::results::{self, Computes, Demands};
+use super::super::results::{Computes, Demands};
 use super::super::services::Services;
 use super::super::state::{Absent, Lookup, State};
-use touch2touch_core::ambiguity::Ambiguity;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::DepthMap;
@@ -93,26 +92,5 @@ pub(crate) fn want_thumbnails(wants: &mut Demands<'_>) {
     let start = state.library.rows.start.min(end);
     for pair in &state.library.order[start..end] {
         wants.ask(ThumbnailKey(open.key(*pair)));
-    }
-}
-
-impl Computes for AmbiguityKey {
-    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Self::Value>> {
-        let (sample, finger) = (state.results.samples.get(&self.0.pair)?.clone(), self.0.finger);
-        Some(Job::new(Worker::Compute, "What the GelSlim image leaves open", move |_| {
-            let gelslim = sample.pad(finger).and_then(|t| t.color());
-            Ok(touch2touch_core::ambiguity::ambiguity(&gelslim.ok_or_else(gone)?.difference))
-        }))
-    }
-}
-
-/// The ambiguity of the GelSlim image of one finger, once it is known.
-pub fn ambiguity(state: &State, finger: PadId) -> Option<Ambiguity> {
-    **state.results.ambiguities.get(&AmbiguityKey(state.touch_key(finger)?))?
-}
-
-pub(crate) fn want_ambiguity(wants: &mut Demands<'_>, finger: PadId, touch: TouchKey) {
-    if results::gelslim(wants.state, finger).ready().is_some() {
-        wants.ask(AmbiguityKey(touch));
     }
 }

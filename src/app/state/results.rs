@@ -12,7 +12,6 @@ use super::super::keys::{
 };
 use super::cache::Cache;
 use super::shown::Shown;
-use touch2touch_core::ambiguity::Ambiguity;
 use touch2touch_core::grid::{DepthMap, RgbGrid};
 use touch2touch_core::postprocess::Flag;
 use touch2touch_core::sample::Sample;
@@ -57,8 +56,6 @@ macro_rules! table {
         Comparison(ComparisonKey => Comparison, |found| found.error.len() * 4) in comparisons, 64 * MIB;
         /// Flags: implausible things about the way of a prediction to meters.
         Flags(FlagsKey => Vec<Flag>, |found| found.len() * 512) in flags, MIB;
-        /// The ambiguity of a GelSlim image: what it leaves open.
-        Ambiguity(AmbiguityKey => Option<Ambiguity>, |found| size_of_val(found)) in ambiguities, MIB;
         /// The plan of an export of masks: what it would write where.
         MaskPlan(MaskPlanKey => Plan, |plan| plan.total() * 128) in mask_plans, MIB;
         /// The plan of an import of masks: what it would change.

@@ -14,7 +14,7 @@ use super::super::pane::Workspace;
 use super::library::Place;
 use compare::CompareChoice;
 use scene::SceneLook;
-use touch2touch_core::diffusion::{GUIDANCE, GenerateConfig};
+use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::label::{CleanKind, CleanUp, DrawTool, Layers, Paint};
 use touch2touch_core::postprocess::RefitShift;
 use touch2touch_core::units::clamp_or;
@@ -317,8 +317,6 @@ pub struct GenerateSettings {
     pub eta: f64,
     /// The training steps visited.
     pub spacing: Spacing,
-    /// Scale of the guidance, for bundles trained for it; 1 is none.
-    pub guidance: f64,
     /// A picture on the way after so many steps, and after the first; 0 = none.
     pub preview_every: u32,
     /// True where both fingers are generated (the pose needs both); else only the one selected.
@@ -339,7 +337,6 @@ impl Default for GenerateSettings {
             sampler: Sampler::Ddim,
             eta: 0.0,
             spacing: Spacing::Trailing,
-            guidance: 1.0,
             preview_every: 4,
             both_fingers: true,
             by_itself: true,
@@ -353,7 +350,6 @@ impl GenerateSettings {
     pub fn validated(mut self) -> Self {
         self.steps = self.steps.clamp(*STEPS.start(), *STEPS.end());
         self.eta = clamp_or(self.eta, 0.0, 1.0, 0.0);
-        self.guidance = clamp_or(self.guidance, *GUIDANCE.start(), *GUIDANCE.end(), 1.0);
         self.preview_every = self.preview_every.min(*STEPS.end());
         self
     }
@@ -366,14 +362,11 @@ impl GenerateSettings {
             seed: self.seed,
             sampler: self.sampler,
             spacing: self.spacing,
-            guidance: self.guidance,
         };
         match (self.preset, &bundle.generator) {
             (Some(preset), Some(g)) => {
                 GenerateConfig { seed: self.seed, ..preset.config(g.defaults, g.training_steps) }
             }
-            // Without the training for it a scale means nothing, whatever was chosen for another bundle.
-            (None, Some(g)) if !g.guided => GenerateConfig { guidance: 1.0, ..own },
             _ => own,
         }
     }
@@ -382,19 +375,12 @@ impl GenerateSettings {
     #[must_use]
     pub fn spelt_out(&self, bundle: Option<&BundleInfo>) -> Self {
         let Some(config) = bundle.map(|bundle| self.config(bundle)) else { return self.clone() };
-        Self {
-            steps: config.steps,
-            eta: config.eta,
-            sampler: config.sampler,
-            spacing: config.spacing,
-            guidance: config.guidance,
-            ..self.clone()
-        }
+        Self { steps: config.steps, eta: config.eta, sampler: config.sampler, spacing: config.spacing, ..self.clone() }
     }
 
     /// True where the numbers that a preset stands for are the same.
     pub(crate) fn same_numbers(&self, other: &Self) -> bool {
-        let numbers = |s: &Self| (s.steps, s.sampler, s.spacing, s.eta.to_bits(), s.guidance.to_bits());
+        let numbers = |s: &Self| (s.steps, s.sampler, s.spacing, s.eta.to_bits());
         numbers(self) == numbers(other)
     }
 }

@@ -2,7 +2,6 @@
 
 use serde::Serialize;
 
-use touch2touch_core::ambiguity::{Ambiguity, TouchKind};
 use touch2touch_core::evaluation;
 use touch2touch_core::findings::Finding;
 use touch2touch_core::metrics::Unstretched;
@@ -44,9 +43,6 @@ pub(super) struct Pair {
     pub(super) finger: Text,
     #[serde(flatten)]
     pub(super) figures: Figures,
-    /// Verdict on whether the GelSlim image tells where on the tool it is.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) ambiguity: Option<Ambiguity>,
     /// Of the prediction; where both fingers were predicted in one go, half of it.
     pub(super) seconds: f64,
     /// True where it was made before and only read now.
@@ -57,8 +53,6 @@ pub(super) struct Pair {
 pub(super) struct Mean {
     #[serde(flatten)]
     pub(super) figures: Figures,
-    /// Pairs whose GelSlim image leaves the place along a bare shaft open.
-    pub(super) ambiguous: usize,
     pub(super) seconds: Option<f64>,
 }
 
@@ -102,7 +96,6 @@ pub(super) struct Report {
     pub(super) sampler: String,
     pub(super) steps: u32,
     pub(super) seed: u64,
-    pub(super) guidance: f64,
     /// Oddities of the files, by kind.
     pub(super) notes: Vec<Finding>,
 }
@@ -128,9 +121,7 @@ pub(super) fn mean(pairs: &[Pair]) -> Mean {
         unstretched: unstretched_mean(pairs.iter().filter_map(|p| p.figures.unstretched)),
         vqvae: unstretched_mean(pairs.iter().filter_map(|p| Some(p.figures.vqvae?.0))).map(Stored),
     };
-    let ambiguous = |pair: &&Pair| pair.ambiguity.is_some_and(|a| a.kind == TouchKind::BareShaft);
-    let seconds = evaluation::mean(pairs.iter().map(|pair| pair.seconds));
-    Mean { figures, ambiguous: pairs.iter().filter(ambiguous).count(), seconds }
+    Mean { figures, seconds: evaluation::mean(pairs.iter().map(|pair| pair.seconds)) }
 }
 
 /// The report as a table of its pairs.
@@ -141,9 +132,9 @@ pub(super) fn text(report: &Report) -> String {
         "{:<44} {:>8} {:>6} {:>12} {:>10} {:>8}\n",
         "pair", "PSNR dB", "SSIM", "VQ-VAE dB", "VQ-VAE SSIM", "seconds"
     );
-    let mut line = |name: &str, p: &Figures, seconds: Option<f64>, note: &str| {
+    let mut line = |name: &str, p: &Figures, seconds: Option<f64>| {
         text += &format!(
-            "{name:<44} {:>8} {:>6} {:>12} {:>10} {:>8}{note}\n",
+            "{name:<44} {:>8} {:>6} {:>12} {:>10} {:>8}\n",
             number(p.psnr_db, 1),
             number(p.ssim, 3),
             number(p.vqvae_psnr_db, 1),
@@ -153,17 +144,13 @@ pub(super) fn text(report: &Report) -> String {
     };
     for p in pairs {
         let name = format!("{} {}", p.name, p.finger);
-        let note = p.ambiguity.and_then(|a| a.caption()).map_or(String::new(), |c| format!("  {c}"));
-        line(&name, &p.figures, Some(p.seconds), &note);
+        line(&name, &p.figures, Some(p.seconds));
     }
-    line("mean", &report.mean.figures, report.mean.seconds, "");
+    line("mean", &report.mean.figures, report.mean.seconds);
     text + &format!(
-        "{}\n{}\n{} of {} GelSlim images are ambiguous \
-         (bare shaft); {} steps, seed {}, {} on {}\n",
+        "{}\n{}\n{} steps, seed {}, {} on {}\n",
         unstretched_text(&report.mean.figures),
         report.convention,
-        report.mean.ambiguous,
-        pairs.len(),
         report.steps,
         report.seed,
         report.bundle,

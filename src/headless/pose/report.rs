@@ -5,12 +5,10 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use touch2touch_core::align::{AlignReport, Evidence, PoseAnswer};
-use touch2touch_core::ambiguity::Ambiguity;
 use touch2touch_core::findings::Finding;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::manual::AcceptedPose;
 use touch2touch_core::metrics::AngleSummary;
-use touch2touch_core::rig::PerPad;
 use touch2touch_core::units::angle_error;
 use touch2touch_core::verdict::{Grade, Verdict};
 use touch2touch_core::which_tool::Candidate;
@@ -55,9 +53,6 @@ pub(super) struct PoseRow {
     pub(super) accepted: Option<Accepted>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) report: Option<AlignReport>,
-    /// Of a predicted imprint: what the GelSlim images (right, left) leave open about where on the tool they are.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) ambiguity: Option<PerPad<Ambiguity>>,
 }
 
 /// A pose that the touch allows, in the sense of the other numbers of a [`PoseRow`].

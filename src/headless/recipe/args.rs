@@ -8,7 +8,7 @@ use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use super::super::args::keyed;
-use touch2touch_core::diffusion::{GUIDANCE, Sampler, Spacing};
+use touch2touch_core::diffusion::{Sampler, Spacing};
 use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_pipeline::infer::engine::EngineChoice;
 use touch2touch_pipeline::steps::bundles::{self, BundleKind, FoundBundles};
@@ -32,9 +32,6 @@ pub struct ModelArgs {
     /// Fresh noise that DDIM adds per step, 0 to 1.
     #[arg(long)]
     pub(super) eta: Option<f64>,
-    /// Scale of classifier-free guidance, 1 for none; only for a bundle that was trained for it.
-    #[arg(long, value_parser = guidance)]
-    pub(super) guidance: Option<f64>,
     /// Spacing of the sampling steps: `trailing` starts at the noisiest one, `lab` is that of the public release.
     #[arg(long, value_parser = keyed::<Spacing>())]
     pub(super) spacing: Option<Spacing>,
@@ -66,11 +63,6 @@ impl ModelArgs {
     pub(in crate::headless) fn without_mapping(&self) -> Self {
         Self { mapping: MappingArgs { shift: ShiftChoice::default() }, ..self.clone() }
     }
-}
-
-fn guidance(text: &str) -> Result<f64, String> {
-    let value = text.parse().ok().filter(|scale| GUIDANCE.contains(scale));
-    value.ok_or_else(|| format!("choose {} to {}; 1 is none", GUIDANCE.start(), GUIDANCE.end()))
 }
 
 /// Mapping of the decoder's output to meters, as the command line says it.

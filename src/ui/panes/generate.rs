@@ -11,7 +11,6 @@ use crate::app::keys::{ComparisonKey, PredictionKey, Preset, Sampler, ShiftMode,
 use crate::app::settings::{GenerateSettings, STEPS};
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{SMALL, caption, section, value};
-use touch2touch_core::diffusion::GUIDANCE;
 use touch2touch_core::postprocess::{CorrectionPart, CorrectionParts};
 use touch2touch_pipeline::steps::bundles::{BundleInfo, BundleKind};
 
@@ -113,7 +112,6 @@ fn presets(cx: &Cx<'_>, ui: &mut Ui, new: &mut GenerateSettings) {
 /// The numbers behind the presets, and when previews and predictions are made.
 fn numbers(cx: &mut Cx<'_>, ui: &mut Ui, new: &mut GenerateSettings) {
     let bundle = recipe::bundle(cx.state, BundleKind::Generator).ok();
-    let guided = bundle.and_then(|bundle| bundle.generator.as_ref()).is_some_and(|g| g.guided);
     row(ui, cx.p.weak, "Sampler", |ui| {
         let combo = egui::ComboBox::from_id_salt("sampler").width(72.0).selected_text(sampler_name(new.sampler));
         let response = combo.show_ui(ui, |ui| {
@@ -152,14 +150,6 @@ fn numbers(cx: &mut Cx<'_>, ui: &mut Ui, new: &mut GenerateSettings) {
         }
         cx.action_button(ui, Action::GenerateNewSeed, "New");
     });
-    if guided {
-        row(ui, cx.p.weak, "Guidance", |ui| {
-            let range = *GUIDANCE.start()..=*GUIDANCE.end();
-            let drag = egui::DragValue::new(&mut new.guidance).speed(0.05).range(range).fixed_decimals(1);
-            let tip = "How closely the prediction follows the GelSlim image; above 1: more closely than the model was trained to";
-            reset(ui.add(drag).accessible_name("Guidance"), tip, "1.0", || new.guidance = 1.0);
-        });
-    }
     row(ui, cx.p.weak, "Preview", |ui| {
         let drag = egui::DragValue::new(&mut new.preview_every).speed(0.1).range(0..=100);
         let tip = "Shows an intermediate picture after every so many steps; 0 shows only the result";
@@ -240,7 +230,6 @@ fn sampler_name(sampler: Sampler) -> &'static str {
     match sampler {
         Sampler::Ddim => "DDIM",
         Sampler::Ddpm => "DDPM",
-        Sampler::DpmSolver2m => "DPM++ 2M",
     }
 }
 

@@ -462,7 +462,7 @@ fn depth_pane(
             Some(LabelsCommand::BeginStroke { finger, source, at_px, erase })
         });
     }
-    captions(cx, &output, pane, finger);
+    captions(cx, &output, finger);
     histogram
 }
 
@@ -492,15 +492,10 @@ pub(crate) fn window(cx: &Cx<'_>, output: &CanvasOutput, finger: PadId) {
     }
 }
 
-fn captions(cx: &Cx<'_>, output: &CanvasOutput, pane: Pane, finger: PadId) {
+fn captions(cx: &Cx<'_>, output: &CanvasOutput, finger: PadId) {
     let text = finger_text(cx.state, finger);
     output.caption(Align2::LEFT_BOTTOM, &source_note(cx.state), crate::ui::parts::theme::DARK.caution);
     output.caption(Align2::LEFT_TOP, &text, cx.p.strong_on_image());
-    if let Some(warning) =
-        results::ambiguity(cx.state, finger).and_then(|a| a.caption()).filter(|_| pane == Pane::Predicted)
-    {
-        output.caption(Align2::RIGHT_BOTTOM, warning, crate::ui::parts::theme::DARK.caution);
-    }
 }
 
 /// The value under the pointer, in millimeters.

@@ -207,9 +207,6 @@ fn comparison(cx: &mut Cx<'_>, ui: &mut Ui) {
                 ] {
                     line(0.0).show(ui, (name, cx.p.weak), &[(number, cx.p.strong)]);
                 }
-                if let Some(warning) = results::ambiguity(cx.state, finger).and_then(|a| a.warning()) {
-                    ui.add(Label::new(RichText::new(warning).size(SMALL).color(cx.p.caution)).wrap());
-                }
             }
             Lookup::Waiting => {
                 ui.label(caption("…", cx.p));

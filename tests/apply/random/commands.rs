@@ -17,10 +17,10 @@ use touch2touch::app::doctor::{Examine, ReadOtherwise, TryModels};
 use touch2touch::app::effect::{LabelsToSave, NotSaved, TaskResult};
 use touch2touch::app::evaluate::{Score, ScoreChoice};
 use touch2touch::app::export::{Output, StillAsked};
-use touch2touch::app::keys::{AmbiguityKey, Preview};
 use touch2touch::app::keys::{
     DatasetSeq, ImprintSource, PairKey, PredictionKey, Registration, Revision, ShiftMode, TouchKey,
 };
+use touch2touch::app::keys::{PictureKey, Preview};
 use touch2touch::app::labels::{ImportMasks, PairLabels, Review, StrokeIn3d};
 use touch2touch::app::learn::{AdaptPairs, Learn, LearnForm, Learned, Network};
 use touch2touch::app::library::{Open, Place, ReadTool, Sort};
@@ -43,6 +43,7 @@ use touch2touch_core::label::{CleanKind, CleanUp, Layers, Paint, Sight};
 use touch2touch_core::manual::PoseAxis;
 use touch2touch_core::pose::Gate;
 use touch2touch_core::rig::{PadId, lab};
+use touch2touch_pipeline::compare::Beside;
 use touch2touch_pipeline::compare::subject::Subject;
 use touch2touch_pipeline::doctor::{Cure, Examined, Worth};
 use touch2touch_pipeline::error::TaskError;
@@ -303,6 +304,11 @@ fn evaluation() -> Evaluation {
 /// A number of an opening that never was.
 const NEVER: DatasetSeq = DatasetSeq(u32::MAX);
 
+/// A picture that lies beside no pair.
+fn beside() -> Beside {
+    Beside { tile: DepthMap::filled(2, 2, 0.0), imprint: DepthMap::filled(2, 2, 0.0) }
+}
+
 fn followed() -> Followed {
     Followed {
         source: demo(),
@@ -526,7 +532,7 @@ draws! {
         1 SettingsLoaded(mask().prop_map(|mask| Box::new(Settings { mask, ..Settings::default() })), Just(None)),
         1 Demanded(touch().prop_map(|touch| vec![Request::Sample(touch.pair)])),
         1 Computed(select(vec![DatasetSeq(1), NEVER]),
-            touch().prop_map(|touch| Computed::Ambiguity(AmbiguityKey(touch), Arc::new(None)))),
+            touch().prop_map(|touch| Computed::Picture(PictureKey(touch), Arc::new(beside())))),
         1 Previewed(ticket(), recipe().prop_map(|recipe| {
             Arc::new(Preview { recipe, picture: PreviewPicture { step: 1, of: 2, depth: DepthMap::filled(2, 2, 0.0) } })
         })),

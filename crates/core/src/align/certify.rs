@@ -15,6 +15,8 @@ use super::{AlignConfig, Certificate};
 
 /// The box is this much larger than the prior (24 degrees, 6 mm for the default).
 const WIDER: [f64; 2] = [24.0 / 22.5, 1.2];
+/// Share of the cost by which an answer may miss the best and still count as proved.
+const GAP: f64 = 0.02;
 /// Cost per point, as a share of the squared kernel width, below which differences do not matter.
 const NEGLIGIBLE: f64 = 1e-4;
 /// Boxes of the angle to start from, half as wide as this, radians.
@@ -65,7 +67,7 @@ struct Proof<'a, 's> {
 }
 
 /// Searches the prior, a little widened, for the best pose of `cloud`, from the answer `best`; returns the better one if there
-/// is one. Of the settings, the prior, the gap and the budget count.
+/// is one. Of the settings, the prior and the budget count.
 pub(super) fn certify(
     search: &mut Search<'_>,
     cloud: &Cloud,
@@ -188,7 +190,7 @@ impl Proof<'_, '_> {
 
     /// Cost from which a region is done: it holds no pose that beats the best by more than the gap.
     fn enough(&self) -> f64 {
-        self.best.cost * (1.0 - self.config.gap) - NEGLIGIBLE * self.cost.kernel.powi(2)
+        self.best.cost * (1.0 - GAP) - NEGLIGIBLE * self.cost.kernel.powi(2)
     }
 
     /// Bounds a region, and follows its middle if that is better than the best so far.

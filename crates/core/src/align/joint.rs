@@ -24,97 +24,25 @@ mod turned;
 use serde::{Deserialize, Serialize};
 
 use super::register::check_overlap;
-use super::{AlignConfig, AlignError, AlignReport, Ask, Outcome, Range, Register, Rung, RungAttempt, Scene};
+use super::{AlignConfig, AlignError, AlignReport, Ask, Outcome, Prior, Range, Register, Rung, RungAttempt, Scene};
 use crate::frames::PlanarPose;
 use crate::tool::ToolModel;
 pub use answers::PoseAnswer;
 pub use evidence::{Elsewhere, Evidence, MembraneEvidence};
-use problem::{Problem, check};
+use problem::Problem;
 
-/// Choices of the registration by membrane and mask. The default is what the product uses.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// Share of the membrane's relief below which the membrane alone is asked as well, and answers if it explains more.
+const DOUBTFUL: f64 = 0.3;
+/// Least share of the membrane's relief that the tool must explain, or the mask alone answers.
+const EXPLAINED: f64 = 0.05;
+/// The same of a predicted one.
+const PREDICTED_EXPLAINED: f64 = 0.5;
+
+/// The registration by membrane and mask. The default is what the product uses.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct JointConfig {
-    /// Poses to start from, `grasp_from_object`: exactly these. Empty: its own.
-    pub starts: Vec<PlanarPose>,
-    /// Poses among which the tool is looked for where the prior of `mask` does not have it; not beyond that one unless wider.
+    /// Poses among which the tool is looked for where the prior does not have it; not beyond that one unless wider.
     pub range: Range,
-    /// The registration by the mask alone, which answers where the membrane says little; its prior is this one's.
-    pub mask: AlignConfig,
-    /// Places of the membranes that are compared in each band, coarse to fine, and for the answer (in the finest).
-    pub points: [usize; 4],
-    /// Widths of the Geman-McClure kernel likewise, meters.
-    pub kernels_m: [f64; 4],
-    /// Points of the mask while starts are told apart, and for the answer.
-    pub mask_points: [usize; 2],
-    /// Widths of the mask's kernel, meters, likewise.
-    pub mask_kernels_m: [f64; 2],
-    /// Weight of the mask beside the membrane.
-    pub weight: MaskWeight,
-    /// Most steps in each band.
-    pub max_iterations: usize,
-    /// Costs this close, as a share, do not tell two ends apart.
-    pub close: f64,
-    /// Share of the membrane's relief that an answer from the prior must explain, or scouts start all around: of a membrane that
-    /// hangs from the tool, and of one that reaches the middle plane.
-    pub stands: [f64; 2],
-    /// Share of its cost that another pose must be ahead of it.
-    pub ahead: f64,
-    /// Share of the membrane's relief below which the membrane alone is asked as well, and answers if it explains more.
-    pub doubtful: f64,
-    /// Least share of the membrane's relief that the tool must explain, or the mask alone answers.
-    pub explained: f64,
-    /// The same of a predicted one.
-    pub predicted_explained: f64,
-    /// Keep per-iteration states and per-point residuals.
-    pub record: bool,
-}
-
-/// Weight of the mask beside the membrane, as a factor of its mean cost.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct MaskWeight {
-    /// While starts are told apart.
-    pub scouts: f64,
-    /// For the answer, where the membrane has the noise of `noise_m`. It grows with the fourth power of the noise: what the
-    /// membrane tells falls with the square of the noise, and model errors make its residuals alike.
-    pub answer: f64,
-    /// Noise, meters.
-    pub noise_m: f64,
-    /// Least and greatest weight for the answer.
-    pub range: [f64; 2],
-    /// Least weight beside predicted images: their errors are no noise, so that nothing is seen of them in the images.
-    pub predicted: f64,
-    /// Mean cost of the mask at the membrane's pose from which on it counts less, by its inverse.
-    pub agrees: f64,
-}
-
-impl Default for JointConfig {
-    fn default() -> Self {
-        Self {
-            starts: Vec::new(),
-            range: Range::default(),
-            mask: AlignConfig::default(),
-            points: [100, 150, 400, 1200],
-            kernels_m: [4e-3, 1e-3, 0.5e-3, 0.5e-3],
-            mask_points: [64, 400],
-            mask_kernels_m: [2e-3, 1e-3],
-            weight: MaskWeight {
-                scouts: 0.1,
-                answer: 0.02,
-                noise_m: 0.075e-3,
-                range: [0.02, 0.3],
-                predicted: 0.3,
-                agrees: 0.1,
-            },
-            max_iterations: 20,
-            close: 0.15,
-            stands: [0.3, 0.4],
-            ahead: 0.03,
-            doubtful: 0.3,
-            explained: 0.05,
-            predicted_explained: 0.5,
-            record: false,
-        }
-    }
 }
 
 /// Who answered.
@@ -172,63 +100,57 @@ impl JointFit {
 
 impl JointConfig {
     /// True for a pose in the prior or in the range.
-    fn allows(&self, pose: PlanarPose) -> bool {
-        self.mask.prior.allows(pose) || self.is_wider() && self.range.prior().allows(pose)
+    fn allows(self, pose: PlanarPose) -> bool {
+        Prior::default().allows(pose) || self.is_wider() && self.range.prior().allows(pose)
     }
 
     /// True where poses beyond the prior may be looked for.
-    fn is_wider(&self) -> bool {
+    fn is_wider(self) -> bool {
         self.range != Range::default()
     }
 }
 
 impl Register for JointConfig {
     fn run(&self, scene: &Scene<'_>, tool: &ToolModel, ask: Ask<'_>) -> Result<AlignReport, AlignError> {
-        let mut config = self.clone();
-        config.record = ask.record;
-        if let Some(starts) = ask.starts {
-            if starts.is_empty() {
-                return Err(AlignError::Config { what: "starts" });
-            }
-            config.starts = starts.to_vec();
+        if ask.starts.is_some_and(|starts| starts.is_empty() || starts.iter().any(|s| !s.is_finite())) {
+            return Err(AlignError::Config { what: "starts" });
         }
-        check(&config)?;
-        let by_mask_from = |fit: JointFit, starts: Vec<PlanarPose>| -> Result<AlignReport, AlignError> {
-            let report = AlignConfig { starts, ..self.mask.clone() }.run(scene, tool, ask)?;
-            let within_prior = report.within_prior || config.allows(report.grasp_from_object);
-            Ok(AlignReport { joint: Some(fit), range: config.range, within_prior, ..report })
+        let by_mask_from = |fit: JointFit, starts: &[PlanarPose]| -> Result<AlignReport, AlignError> {
+            let report = AlignConfig { starts: starts.to_vec(), ..AlignConfig::default() }.run(scene, tool, ask)?;
+            let within_prior = report.within_prior || self.allows(report.grasp_from_object);
+            Ok(AlignReport { joint: Some(fit), range: self.range, within_prior, ..report })
         };
-        let by_mask = |fit: JointFit| by_mask_from(fit, config.starts.clone());
+        let by_mask = |fit: JointFit| by_mask_from(fit, &[]);
         if scene.images().is_empty() {
             return by_mask(JointFit::by_mask(Basis::NoImage));
         }
-        let Some(mut problem) = Problem::new(scene, tool, &config)? else {
+        let Some(mut problem) = Problem::new(scene, tool, *self, ask)? else {
             return by_mask(JointFit::by_mask(Basis::NoZone));
         };
-        if ask.starts.is_some() {
+        if let Some(starts) = ask.starts {
             // Asked is where these lead, not what else would answer.
             let finite = scene.yz().iter().copied().filter(|p| p.is_finite());
             if finite.clone().next().is_some() {
-                check_overlap(finite, &tool.field, &config.starts)?;
+                check_overlap(finite, &tool.field, starts)?;
             }
             return Ok(problem.report(scene.yz(), problem.solve(false)));
         }
-        let mut answer = problem.solve(config.is_wider());
-        if problem.is_predicted() && answer.fit.explained < config.predicted_explained {
+        let mut answer = problem.solve(self.is_wider());
+        if problem.predicted && answer.fit.explained < PREDICTED_EXPLAINED {
             return by_mask(JointFit { basis: Basis::Unlike, mask_weight: 1.0, ..answer.fit });
         }
-        if answer.fit.explained < config.doubtful && answer.rung != Rung::Around {
+        if answer.fit.explained < DOUBTFUL && answer.rung != Rung::Around {
             // A bad mask can lead all scouts away from what the membrane shows plainly.
-            answer = problem.solve_without_mask(&answer, config.explained).unwrap_or(answer);
+            answer = problem.solve_without_mask(&answer, EXPLAINED).unwrap_or(answer);
         }
-        if answer.fit.explained < config.explained {
+        if answer.fit.explained < EXPLAINED {
             let fit = JointFit { basis: Basis::LittleContact, mask_weight: 1.0, ..answer.fit };
             let (found, around) = (by_mask(fit), problem.start_around(&answer));
             // The mask alone may have no answer in the prior either.
             let settled = |end: &RungAttempt| end.outcome == Outcome::Accepted || end.rung < Rung::Grid;
             let stands =
                 around.is_empty() || found.as_ref().is_ok_and(|found| found.ladder.last().is_some_and(settled));
-            return if stands { found } else { by_mask_from(fit, around) };
+            return if stands { found } else { by_mask_from(fit, &around) };
         }
         Ok(problem.report(scene.yz(), answer))
     }

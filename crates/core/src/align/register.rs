@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::{AlignConfig, AlignError, AlignReport, Cleaned, MIN_SHARE, REACH_M, align, clean};
+use super::{AlignConfig, AlignError, AlignReport, MIN_SHARE, REACH_M, align};
 use crate::field::DistanceField;
 use crate::frames::PlanarPose;
 use crate::grid::DepthMap;
@@ -112,28 +112,6 @@ impl Register for AlignConfig {
         }
         align(scene.yz(), &tool.field, &config)
     }
-}
-
-/// The finite points of a scene.
-pub(super) struct CleanScene {
-    /// Meters, grasp frame.
-    pub(super) points: Vec<DVec3>,
-    /// Mean of the points.
-    pub(super) centroid: DVec3,
-    /// Points left out.
-    pub(super) not_finite: usize,
-}
-
-/// Drops points that are not finite and refuses sets without a size; see [`clean`].
-pub(super) fn clean_scene(scene: &Scene<'_>, needed: usize) -> Result<CleanScene, AlignError> {
-    const MAX_COORDINATE_M: f64 = 1e6;
-    let usable = |p: &DVec3| p.is_finite() && p.abs().max_element() <= MAX_COORDINATE_M;
-    let points: Vec<DVec3> = scene.points().iter().copied().filter(usable).collect();
-    let yz: Vec<DVec2> = points.iter().map(|p| DVec2::new(p.y, p.z)).collect();
-    let Cleaned { centroid, .. } = clean(&yz, needed)?;
-    let x = points.iter().map(|p| p.x - points[0].x).sum::<f64>() / points.len() as f64 + points[0].x;
-    let not_finite = scene.points().len() - points.len();
-    Ok(CleanScene { points, centroid: DVec3::new(x, centroid.x, centroid.y), not_finite })
 }
 
 /// Refuses points of which next to none come near the silhouette at any start: a nearest neighbor always exists,

@@ -2,52 +2,44 @@
 
 use std::sync::Arc;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::tree::{Tree, Two};
+use crate::tool::ToolModel;
 
+/// Model that the lab's loop compares with: points of the surface, meters, object frame, as seen along the closing axis.
 #[derive(Debug)]
-enum Index {
-    /// Over y and z alone.
-    Plane(Tree<2>),
-    Space(Tree<3>),
+pub struct LabModel {
+    points: Vec<DVec2>,
+    tree: Tree<2>,
 }
 
-/// Points, meters, object frame, under a k-d tree.
-#[derive(Clone, Debug)]
-pub(super) struct Samples {
-    points: Arc<[DVec3]>,
-    index: Arc<Index>,
-}
-
-impl Samples {
-    /// Compares in all three coordinates. Points that are not finite are left out.
-    pub(super) fn in_space(points: &[DVec3]) -> Self {
-        Self::new(points, |points| Index::Space(Tree::new(&points.iter().map(DVec3::to_array).collect::<Vec<_>>())))
+impl LabModel {
+    /// The tool's, made at the first request and kept with it.
+    pub fn of(tool: &ToolModel) -> Arc<Self> {
+        tool.derived(|tool| Self::new(&tool.surface().iter().map(|(p, _)| *p).collect::<Vec<_>>()))
     }
 
-    /// Compares in y and z only. Points that are not finite are left out.
-    pub(super) fn in_plane(points: &[DVec3]) -> Self {
-        Self::new(points, |points| Index::Plane(Tree::new(&points.iter().map(|p| [p.y, p.z]).collect::<Vec<_>>())))
-    }
-
-    fn new(points: &[DVec3], index: impl Fn(&[DVec3]) -> Index) -> Self {
+    /// From points of the surface, meters, object frame. Those that are not finite are left out.
+    pub fn new(points: &[DVec3]) -> Self {
         // A NaN would make every comparison, and so the tree, meaningless.
-        let points: Arc<[DVec3]> = points.iter().copied().filter(|p| p.is_finite()).collect();
-        Self { index: Arc::new(index(&points)), points }
+        let finite = points.iter().filter(|p| p.is_finite());
+        let points: Vec<DVec2> = finite.map(|p| DVec2::new(p.y, p.z)).collect();
+        Self { tree: Tree::new(&points.iter().map(DVec2::to_array).collect::<Vec<_>>()), points }
     }
 
-    /// A point, meters, object frame.
-    pub(super) fn point(&self, item: u32) -> DVec3 {
+    pub(super) fn len(&self) -> usize {
+        self.points.len()
+    }
+
+    /// A point, (y, z), meters, object frame.
+    pub(super) fn point(&self, item: u32) -> DVec2 {
         self.points[item as usize]
     }
 
     /// The nearest point and how much farther the second nearest is, meters. `p` must be finite; the list not empty.
-    pub(super) fn nearest(&self, p: DVec3) -> (u32, f64) {
-        let Two { items, squared } = match &*self.index {
-            Index::Plane(tree) => tree.two_nearest(&[p.y, p.z]),
-            Index::Space(tree) => tree.two_nearest(&p.to_array()),
-        };
+    pub(super) fn nearest(&self, p: DVec2) -> (u32, f64) {
+        let Two { items, squared } = self.tree.two_nearest(&p.to_array());
         (items[0], squared[1].sqrt() - squared[0].sqrt())
     }
 }
@@ -58,7 +50,7 @@ impl Samples {
 #[derive(Debug)]
 pub(super) struct Matcher {
     nearest: Vec<u32>,
-    at: Vec<DVec3>,
+    at: Vec<DVec2>,
     slack: Vec<f64>,
     /// Questions to the tree.
     pub(super) lookups: usize,
@@ -66,18 +58,18 @@ pub(super) struct Matcher {
 
 impl Matcher {
     pub(super) fn new(count: usize) -> Self {
-        Self { nearest: vec![u32::MAX; count], at: vec![DVec3::ZERO; count], slack: vec![-1.0; count], lookups: 0 }
+        Self { nearest: vec![u32::MAX; count], at: vec![DVec2::ZERO; count], slack: vec![-1.0; count], lookups: 0 }
     }
 
     /// The model point nearest to contact `i`, now at `p` in the object frame, and whether it is another than before.
     #[inline]
-    pub(super) fn find(&mut self, samples: &Samples, i: usize, p: DVec3) -> (u32, bool) {
+    pub(super) fn find(&mut self, model: &LabModel, i: usize, p: DVec2) -> (u32, bool) {
         let before = self.nearest[i];
         let slack = self.slack[i];
         if slack > 0.0 && p.distance_squared(self.at[i]) < slack * slack {
             return (before, false);
         }
-        let (item, lead) = samples.nearest(p);
+        let (item, lead) = model.nearest(p);
         self.lookups += 1;
         self.nearest[i] = item;
         self.at[i] = p;
@@ -96,19 +88,18 @@ mod tests {
     proptest! {
         /// A walk of small and large steps: the shortcut must give what a search of all points gives.
         #[test]
-        fn the_matcher_equals_a_full_search(seed in 0u64..50, flat in proptest::bool::ANY) {
-            let points = cross().sample_surface(300, seed);
-            let samples = if flat { Samples::in_plane(&points) } else { Samples::in_space(&points) };
+        fn the_matcher_equals_a_full_search(seed in 0u64..50) {
+            let yz = |count, seed| cross().sample_surface(count, seed).iter().map(|p| DVec2::new(p.y, p.z)).collect::<Vec<_>>();
+            let model = LabModel::new(&cross().sample_surface(300, seed));
             let mut matcher = Matcher::new(40);
-            let start = cross().sample_surface(40, seed + 1000);
+            let (points, start) = (yz(300, seed), yz(40, seed + 1000));
             for step in 0..30 {
-                let shift = DVec3::new(0.1, 0.7, -0.4) * 1e-5 * 1.4f64.powi(step);
+                let shift = DVec2::new(0.7, -0.4) * 1e-5 * 1.4f64.powi(step);
                 for (i, p) in start.iter().enumerate() {
                     let p = *p + shift;
-                    let (item, _) = matcher.find(&samples, i, p);
-                    let cut = |d: DVec3| if flat { d.with_x(0.0) } else { d }.length();
-                    let best = points.iter().map(|m| cut(*m - p)).fold(f64::INFINITY, f64::min);
-                    prop_assert!((cut(samples.point(item) - p) - best).abs() < 1e-12);
+                    let (item, _) = matcher.find(&model, i, p);
+                    let best = points.iter().map(|m| (*m - p).length()).fold(f64::INFINITY, f64::min);
+                    prop_assert!(((model.point(item) - p).length() - best).abs() < 1e-12);
                 }
             }
             prop_assert!(matcher.lookups < 40 * 30, "the shortcut was never taken");
@@ -119,14 +110,12 @@ mod tests {
     #[test]
     fn axis_aligned_coincident_and_broken_points_are_taken() {
         let bar = cuboid(DVec3::ZERO, DVec3::new(0.003, 0.003, 0.03)).sample_surface(5000, 1);
-        for samples in [Samples::in_space(&bar), Samples::in_plane(&bar)] {
-            let (item, _) = samples.nearest(DVec3::new(0.003, 0.0, 0.0));
-            assert!(samples.point(item).with_x(0.0).length() < 0.002);
-        }
-        let same = Samples::in_space(&[DVec3::splat(0.01); 5000]);
-        assert_eq!(same.nearest(DVec3::ZERO).1, 0.0);
-        assert!(Samples::in_space(&[]).points.is_empty() && Samples::in_plane(&[DVec3::NAN; 9]).points.is_empty());
-        let one = Samples::in_plane(&[DVec3::Y]);
-        assert_eq!(one.nearest(DVec3::ZERO), (0, f64::INFINITY));
+        let bar = LabModel::new(&bar);
+        assert!(bar.point(bar.nearest(DVec2::ZERO).0).length() < 0.002);
+        let same = LabModel::new(&[DVec3::splat(0.01); 5000]);
+        assert_eq!(same.nearest(DVec2::ZERO).1, 0.0);
+        assert!(LabModel::new(&[]).points.is_empty() && LabModel::new(&[DVec3::NAN; 9]).points.is_empty());
+        let one = LabModel::new(&[DVec3::Y]);
+        assert_eq!(one.nearest(DVec2::ZERO), (0, f64::INFINITY));
     }
 }

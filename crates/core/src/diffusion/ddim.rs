@@ -7,8 +7,7 @@ use std::ops::ControlFlow;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Denoiser, GUIDANCE, GaussianNoise, ModelError, Prediction, Progress, Schedule, ScheduleError, Spacing, Step,
-    Tensor, Watch,
+    Denoiser, GaussianNoise, ModelError, Prediction, Progress, Schedule, ScheduleError, Spacing, Step, Tensor, Watch,
 };
 
 /// A clean latent, `[batch, channels, height, width]`.
@@ -22,12 +21,11 @@ pub(crate) type Latent = Tensor;
 pub enum Sampler {
     /// Denoising diffusion implicit models; `eta` 0 is deterministic, 1 is ancestral sampling.
     #[default]
+    // What settings and bundles of earlier versions may name, whose ends are next to the same.
+    #[serde(alias = "dpm_solver2m")]
     Ddim,
     /// Ancestral sampling: DDIM with `eta` 1, whatever the configuration says.
     Ddpm,
-    /// DPM-Solver++(2M): second order, deterministic, on the data prediction (Lu et al. 2022, algorithm 2). The first
-    /// and the last step are of first order, which is DDIM without noise. `eta` is not used.
-    DpmSolver2m,
 }
 
 impl Sampler {
@@ -51,17 +49,13 @@ pub struct GenerateConfig {
     pub sampler: Sampler,
     /// The training steps visited.
     pub spacing: Spacing,
-    /// Scale of classifier-free guidance, [`GUIDANCE`]; 1 is none. Whoever makes the denoiser sees to it (with
-    /// [`super::Guided`]); the sampler itself only passes it on.
-    #[serde(default = "no_guidance")]
-    pub guidance: f64,
 }
 
 impl GenerateConfig {
     /// The settings as they stand beside each picture, 3D view and file of a prediction: `2 steps · seed 42`, with the
-    /// sampler, its noise and the guidance where they are not the usual ones.
+    /// sampler and its noise where they are not the usual ones.
     pub fn text(&self) -> String {
-        let Self { steps, eta, seed, sampler, guidance, .. } = *self;
+        let Self { steps, eta, seed, sampler, .. } = *self;
         let plural = if steps == 1 { "" } else { "s" };
         let mut text = format!("{steps} step{plural} · seed {seed}");
         if sampler != Sampler::default() {
@@ -70,17 +64,14 @@ impl GenerateConfig {
         if eta != 0.0 {
             text += &format!(" · eta {eta}");
         }
-        if guidance != 1.0 {
-            text += &format!(" · guidance {guidance}");
-        }
         text
     }
 
     /// All of it as whole numbers, which have an order.
-    fn bits(&self) -> (u32, u64, Sampler, u64, Spacing, u64) {
-        let Self { steps, eta, seed, sampler, spacing, guidance } = *self;
+    fn bits(&self) -> (u32, u64, Sampler, u64, Spacing) {
+        let Self { steps, eta, seed, sampler, spacing } = *self;
         // + 0.0 turns -0 into 0.
-        (steps, seed, sampler, (eta + 0.0).to_bits(), spacing, (guidance + 0.0).to_bits())
+        (steps, seed, sampler, (eta + 0.0).to_bits(), spacing)
     }
 }
 
@@ -112,13 +103,8 @@ impl Hash for GenerateConfig {
 
 impl Default for GenerateConfig {
     fn default() -> Self {
-        let guidance = no_guidance();
-        Self { steps: 50, eta: 0.0, seed: 42, sampler: Sampler::Ddim, spacing: Spacing::Trailing, guidance }
+        Self { steps: 50, eta: 0.0, seed: 42, sampler: Sampler::Ddim, spacing: Spacing::Trailing }
     }
-}
-
-fn no_guidance() -> f64 {
-    1.0
 }
 
 /// Why a generation has no result.
@@ -157,11 +143,6 @@ pub fn sample(
     if !(0.0..=1.0).contains(&config.eta) {
         return Err(DiffusionError::Choice(format!("eta is {}; choose 0 (deterministic) to 1", config.eta)));
     }
-    if !GUIDANCE.contains(&config.guidance) {
-        let (scale, start, end) = (config.guidance, GUIDANCE.start(), GUIDANCE.end());
-        let why = format!("the guidance scale is {scale}; choose {start} to {end}, 1 for none");
-        return Err(DiffusionError::Choice(why));
-    }
     if seeds.len() != condition.batch() {
         let why = format!("{} seeds for {} conditions", seeds.len(), condition.batch());
         return Err(DiffusionError::Choice(why));
@@ -182,11 +163,6 @@ pub fn sample(
     let mut x: Vec<f64> = noises.iter_mut().flat_map(|n| (0..len).map(|_| n.draw()).collect::<Vec<_>>()).collect();
     let mut input = Tensor::filled(shape.clone(), 0.0);
     // The clean latent as it was estimated one step earlier, for the second order.
-    let mut earlier = Vec::new();
-    if config.sampler == Sampler::DpmSolver2m {
-        earlier = vec![0.0; x.len()];
-    }
-
     for (done, step) in steps.iter().enumerate() {
         tell(watch, done as u32)?;
         input.data_mut().iter_mut().zip(&x).for_each(|(to, &from)| *to = from as f32);
@@ -205,13 +181,6 @@ pub fn sample(
             let clean = x.iter().zip(output.data()).map(|(&x, &output)| update.split(x, f64::from(output)).0 as f32);
             watch.estimate(after, &Tensor::new(shape.clone(), clean.collect()).expect("one value per latent value"));
         }
-        if config.sampler == Sampler::DpmSolver2m {
-            let update = SecondOrder::new(step, done.checked_sub(1).map(|before| &steps[before]), prediction);
-            for ((x, earlier), &output) in x.iter_mut().zip(&mut earlier).zip(output.data()) {
-                *x = update.apply(*x, f64::from(output), earlier);
-            }
-            continue;
-        }
         let eta = if config.sampler == Sampler::Ddpm { 1.0 } else { config.eta };
         let update = Update::new(step, prediction, eta);
         for ((x, output), noise) in x.chunks_mut(len.max(1)).zip(output.data().chunks(len.max(1))).zip(&mut noises) {
@@ -223,43 +192,6 @@ pub fn sample(
     tell(watch, of)?;
     input.data_mut().iter_mut().zip(&x).for_each(|(to, &from)| *to = from as f32);
     Ok(input)
-}
-
-/// One step of DPM-Solver++(2M). With λ the logarithm of signal over noise, the clean latent is extrapolated along λ
-/// from the last two estimates.
-struct SecondOrder {
-    first: Update,
-    /// Weight of the way from the earlier estimate to the present one; 0 for a step of first order.
-    ahead: f64,
-}
-
-impl SecondOrder {
-    fn new(step: &Step, before: Option<&Step>, prediction: Prediction) -> Self {
-        let lambda = |alpha_bar: f64| 0.5 * (alpha_bar.ln() - (-alpha_bar).ln_1p());
-        // Where λ is infinite (pure noise, no noise) the extrapolation has no length to go by.
-        let ahead = before.map_or(0.0, |before| {
-            let (h, h_before) = (
-                lambda(step.alpha_bar_next) - lambda(step.alpha_bar),
-                lambda(step.alpha_bar) - lambda(before.alpha_bar),
-            );
-            let ahead = 0.5 * h / h_before;
-            if h.is_finite() && h_before.is_finite() && ahead.is_finite() { ahead } else { 0.0 }
-        });
-        Self { first: Update::new(step, prediction, 0.0), ahead }
-    }
-
-    fn apply(&self, x: f64, output: f64, earlier: &mut f64) -> f64 {
-        let update = &self.first;
-        let (clean, epsilon) = update.split(x, output);
-        let target = clean + self.ahead * (clean - *earlier);
-        *earlier = clean;
-        if update.noise == 0.0 {
-            return update.signal_next * target + update.direction_next * epsilon;
-        }
-        // With the same clean latent in both terms this is the step of DDIM.
-        let kept = update.direction_next / update.noise;
-        kept * x + (update.signal_next - update.signal * kept) * target
-    }
 }
 
 /// The coefficients of one DDIM step, equation 12 of the paper.

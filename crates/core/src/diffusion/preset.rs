@@ -45,7 +45,7 @@ impl Preset {
         match self {
             Self::Fast => with(1, Sampler::Ddim),
             Self::Default => defaults,
-            Self::Sharp => with(50, Sampler::DpmSolver2m),
+            Self::Sharp => with(50, Sampler::Ddim),
         }
     }
 }

@@ -86,25 +86,6 @@ impl Schedule {
         Self::from_betas((0..steps).map(|i| (start + fraction(i, steps) * (end - start)).powi(2)))
     }
 
-    /// Betas evenly spaced, as in the first diffusion papers.
-    ///
-    /// # Errors
-    /// No steps, or betas outside (0, 1).
-    pub fn linear(steps: usize, beta_start: f64, beta_end: f64) -> Result<Self, ScheduleError> {
-        check_betas(steps, beta_start, beta_end)?;
-        Self::from_betas((0..steps).map(|i| beta_start + fraction(i, steps) * (beta_end - beta_start)))
-    }
-
-    /// Nichol & Dhariwal (2021), equation 17: s = 0.008, betas at most 0.999.
-    ///
-    /// # Errors
-    /// No steps.
-    pub fn cosine(steps: usize) -> Result<Self, ScheduleError> {
-        check_length(steps)?;
-        let share = |t: f64| ((t / steps as f64 + 0.008) / 1.008 * std::f64::consts::FRAC_PI_2).cos().powi(2);
-        Self::from_betas((0..steps).map(|i| (1.0 - share(i as f64 + 1.0) / share(i as f64)).clamp(0.0, 0.999)))
-    }
-
     /// ᾱ of every training step.
     #[cfg(test)]
     pub(crate) fn alpha_bar(&self) -> &[f64] {
@@ -235,10 +216,11 @@ mod tests {
             assert!(Schedule::from_alpha_bar(shares).is_err());
         }
         for (start, end) in [(0.0, 0.1), (0.1, 1.0), (f64::NAN, 0.1), (-0.1, 0.1)] {
-            assert!(Schedule::linear(10, start, end).is_err());
             assert!(Schedule::scaled_linear(10, start, end).is_err());
         }
-        assert!(Schedule::cosine(0).is_err() && Schedule::linear(usize::MAX, 0.1, 0.2).is_err());
+        for steps in [0, usize::MAX] {
+            assert!(Schedule::scaled_linear(steps, 0.1, 0.2).is_err());
+        }
         let to_zero = Schedule::from_alpha_bar(vec![0.9, 0.0]).unwrap();
         let refused = to_zero.steps(2, Spacing::Trailing, Prediction::Epsilon).unwrap_err();
         assert!(refused.to_string().starts_with("training step 1 is pure noise"), "{refused}");

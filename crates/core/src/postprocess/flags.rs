@@ -1,10 +1,7 @@
 //! Flags: implausible things about a depth chain, each with what was seen, why that is odd, and what to do.
 
-use super::{
-    DepthChain, DepthRange, Mapping, PostprocessError, RELATIVE_NO_SPREAD, RawPrediction, Shift, Stage, Stats,
-};
+use super::{DepthChain, DepthRange, PostprocessError, RELATIVE_NO_SPREAD, RawPrediction, Shift, Stage, Stats};
 use crate::grid::{DepthMap, Grid};
-use crate::metrics::line;
 use crate::resample::bilinear;
 use crate::units::{text_mm, text_percent};
 
@@ -17,9 +14,6 @@ const TURNED_AT_LEAST: f64 = 0.3;
 const UNLIKE: f64 = 0.3;
 /// Root mean square disagreement of the channels that is worth a word, meters.
 const CHANNELS_APART_M: f64 = 5e-4;
-/// Largest sound distance of a fitted slope from 1, and of an offset from 0 (meters).
-const SLOPE_OFF: f64 = 0.15;
-const OFFSET_OFF_M: f64 = 1e-3;
 
 /// Severity: how much a person should care.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -53,8 +47,6 @@ pub enum FlagKind {
     ChannelsApart,
     /// Prediction and truth have little in common.
     Unlike,
-    /// The line through prediction against truth is not the diagonal.
-    Calibration,
 }
 
 /// One thing that is implausible.
@@ -67,9 +59,9 @@ pub struct Flag {
     /// Observation, with its numbers.
     pub what: String,
     /// Why that is odd.
-    pub why: String,
+    pub why: &'static str,
     /// Remedy.
-    pub action: String,
+    pub action: &'static str,
 }
 
 /// Everything that is implausible, the worst first. `truth` is the measured imprint (meters, raw orientation); a result of
@@ -139,20 +131,15 @@ fn correlation(a: &Grid<f32>, b: &Grid<f32>) -> Option<f64> {
 struct List(Vec<Flag>);
 
 impl List {
-    fn wrong(&mut self, kind: FlagKind, what: String, why: &str, action: &str) {
-        let (why, action) = (why.to_owned(), action.to_owned());
-        self.0.push(Flag { severity: Severity::Wrong, kind, what, why, action });
-    }
-
-    fn caution(&mut self, kind: FlagKind, what: String, why: &str, action: &str) {
-        let (why, action) = (why.to_owned(), action.to_owned());
-        self.0.push(Flag { severity: Severity::Caution, kind, what, why, action });
+    fn add(&mut self, kind: FlagKind, what: String, why: &'static str, action: &'static str) {
+        let severity = if kind <= FlagKind::Mirrored { Severity::Wrong } else { Severity::Caution };
+        self.0.push(Flag { severity, kind, what, why, action });
     }
 
     fn numbers(&mut self, seen: &[Seen]) {
         // Where it begins; later images only carry it on.
         if let Some(bad) = seen.iter().find(|s| s.stats.count < s.len) {
-            self.wrong(
+            self.add(
                 FlagKind::NotFinite,
                 format!("{} of {} values are not numbers.", bad.len - bad.stats.count, bad.len),
                 "A model that gives NaN or infinity has met an input or a schedule it cannot take.",
@@ -160,7 +147,7 @@ impl List {
             );
         }
         if let Some(flat) = seen.iter().find(|s| s.stats.is_flat() && s.len > 1) {
-            self.wrong(
+            self.add(
                 FlagKind::Constant,
                 format!("All values are {}.", flat.text(flat.stats.mean)),
                 "An imprint has a touched and an untouched part; a constant image shows neither.",
@@ -173,25 +160,19 @@ impl List {
         let values = || raw.channels.iter().flat_map(|c| c.as_slice()).filter(|v| v.is_finite());
         let (count, clamped) = (values().count(), values().filter(|v| v.abs() > 1.0).count());
         let share = clamped as f64 / count as f64;
-        if clamped == 0 || share < CLAMPED {
-            return;
+        if clamped > 0 && share >= CLAMPED {
+            let share = text_percent(share);
+            self.add(
+                FlagKind::Clamped,
+                format!("{clamped} of {count} decoder values ({share}) were outside -1 to 1 and were clamped."),
+                "Beyond its range the model cannot say how deep: those pixels read the end of the range.",
+                "Check the bundle's output range, or use more steps.",
+            );
         }
-        self.caution(
-            FlagKind::Clamped,
-            format!(
-                "{clamped} of {count} decoder values ({}) were outside -1 to 1 and were clamped.",
-                text_percent(share)
-            ),
-            "Beyond its range the model cannot say how deep: those pixels read the end of the range.",
-            "Check the bundle's output range, or use more steps.",
-        );
     }
 
     fn channels(&mut self, chain: &DepthChain, raw: &RawPrediction) {
         let n = raw.channels.len();
-        if n < 2 {
-            return;
-        }
         let meters_per_unit = (chain.range.max_m - chain.range.min_m) / 2.0;
         let (mut sum, mut count) = (0.0, 0usize);
         for i in 0..raw.channels[0].len() {
@@ -205,7 +186,7 @@ impl List {
         }
         let apart_m = meters_per_unit * (sum / count.max(1) as f64).sqrt();
         if apart_m > CHANNELS_APART_M {
-            self.caution(
+            self.add(
                 FlagKind::ChannelsApart,
                 format!("The {n} channels disagree by {} (root mean square).", text_mm(apart_m)),
                 "They are trained to be copies of one depth; where they differ the model is unsure.",
@@ -221,34 +202,32 @@ impl List {
         if result.stats.count == 0 || result.stats.min < middle - 1e-9 * (max_m - min_m) {
             return;
         }
-        let what = format!(
-            "The smallest depth is {}, not below {}, the middle of the range.",
-            text_mm(result.stats.min),
-            text_mm(middle)
+        let (least, middle) = (text_mm(result.stats.min), text_mm(middle));
+        self.add(
+            FlagKind::DoubledMapping,
+            format!("The smallest depth is {least}, not below {middle}, the middle of the range."),
+            "An imprint has untouched pixels near 0; only a range that was mapped twice leaves all of them in the upper half.",
+            match chain.shift {
+                Shift::None => "Choose the exact inverse: 2 · value - max is the depth.",
+                Shift::PaperMeanStd(_) => "Check the shift's statistics, or choose the exact inverse.",
+                Shift::ExactInverse => {
+                    "The decoder's picture seems to be in 0 to 1 already: correct the bundle's output range."
+                }
+            },
         );
-        let why = "An imprint has untouched pixels near 0; only a range that was mapped twice leaves all of them in the \
-                   upper half.";
-        let action = match (chain.mapping, chain.shift) {
-            (Mapping::Doubled, Shift::None) => "Choose the exact inverse: 2 · value - max is the depth.",
-            (Mapping::Doubled, _) => "Check the shift's statistics, or choose the exact inverse.",
-            (Mapping::Correct, _) => {
-                "The decoder's picture seems to be in 0 to 1 already: correct the bundle's output range."
-            }
-        };
-        self.wrong(FlagKind::DoubledMapping, what, why, action);
     }
 
     fn no_spread(&mut self, chain: &DepthChain) {
-        let Shift::PaperMeanStd(stats) = chain.shift else { return };
-        if !stats.has_no_spread(chain.range.max_m) {
-            return;
+        if let Shift::PaperMeanStd(stats) = chain.shift
+            && stats.has_no_spread(chain.range.max_m)
+        {
+            self.add(
+                FlagKind::NoSpread,
+                format!("Only the mean was shifted: the predictions' deviation is {:e} m.", stats.pred_std),
+                "Dividing by a deviation of zero would send every pixel to the end of the range.",
+                "Compute the statistics again over more pairs.",
+            );
         }
-        self.caution(
-            FlagKind::NoSpread,
-            format!("Only the mean was shifted: the predictions' deviation is {:e} m.", stats.pred_std),
-            "Dividing by a deviation of zero would send every pixel to the end of the range.",
-            "Compute the statistics again over more pairs.",
-        );
     }
 
     fn range(&mut self, chain: &DepthChain, result: &DepthMap) {
@@ -257,32 +236,19 @@ impl List {
         let outside = |v: &&f32| f64::from(**v) < min_m - slack || f64::from(**v) > max_m + slack;
         let values = result.as_slice();
         let (count, of) = (values.iter().filter(outside).count(), values.iter().filter(|v| v.is_finite()).count());
-        if count == 0 || (count as f64) < CLAMPED * of as f64 {
-            return;
+        if count > 0 && count as f64 >= CLAMPED * of as f64 {
+            let (share, low, high) = (text_percent(count as f64 / of as f64), text_mm(min_m), text_mm(max_m));
+            self.add(
+                FlagKind::OutOfRange,
+                format!("{count} of {of} pixels ({share}) are outside {low} to {high}."),
+                "The model was trained on depths inside this range: the shift carried them out of it.",
+                "Choose the exact inverse, or statistics of this bundle's own predictions.",
+            );
         }
-        self.caution(
-            FlagKind::OutOfRange,
-            format!(
-                "{count} of {of} pixels ({}) are outside {} to {}.",
-                text_percent(count as f64 / of as f64),
-                text_mm(min_m),
-                text_mm(max_m)
-            ),
-            "The model was trained on depths inside this range: the shift carried them out of it.",
-            "Choose the exact inverse, or statistics of this bundle's own predictions.",
-        );
     }
 
     fn against(&mut self, result: &DepthMap, truth: &DepthMap) {
         let as_is = correlation(result, truth);
-        self.orientation(result, truth, as_is);
-        // A line through images that show different things says nothing about the mapping.
-        if as_is.is_some_and(|r| r >= 2.0 * UNLIKE) {
-            self.calibration(result, truth);
-        }
-    }
-
-    fn orientation(&mut self, result: &DepthMap, truth: &DepthMap, as_is: Option<f64>) {
         let straight = as_is.unwrap_or(0.0);
         let better = |other: Option<f64>| other.filter(|r| *r > TURNED_AT_LEAST && *r > straight + TURNED_BY);
         let turned = better(correlation(result, &truth.rotated_180()));
@@ -290,59 +256,26 @@ impl List {
         let seen = |r: f64, how: &str| {
             format!("Prediction and truth correlate {straight:.2} as they lie, but {r:.2} with the truth {how}.")
         };
-        if let (Some(r), None) = (turned, mirrored) {
-            self.wrong(
-                FlagKind::TurnedBy180,
-                seen(r, "turned by 180°"),
-                "Bubble and GelSlim images are turned against each other by 180°; one turn is missing, or one too \
-                     many.",
-                "Correct rotation_deg of the bundle's input or output.",
-            );
-        }
-        if let Some(r) = mirrored {
-            self.wrong(
+        match (mirrored, turned) {
+            (Some(r), _) => self.add(
                 FlagKind::Mirrored,
                 seen(r, "mirrored (rows reversed)"),
                 "The two fingers see mirror images: one finger may stand for the other.",
                 "Check which finger is which in the data and in the prediction.",
-            );
-        }
-        if turned.is_none()
-            && mirrored.is_none()
-            && let Some(r) = as_is.filter(|r| *r < UNLIKE)
-        {
-            self.caution(
+            ),
+            (None, Some(r)) => self.add(
+                FlagKind::TurnedBy180,
+                seen(r, "turned by 180°"),
+                "Bubble and GelSlim images are turned against each other by 180°; one turn is missing, or one too many.",
+                "Correct rotation_deg of the bundle's input or output.",
+            ),
+            (None, None) if as_is.is_some_and(|r| r < UNLIKE) => self.add(
                 FlagKind::Unlike,
-                format!("Prediction and truth correlate only {r:.2}."),
+                format!("Prediction and truth correlate only {straight:.2}."),
                 "They show different contacts: the tool may be new to the model, or the pair mismatched.",
                 "Look at the two images side by side, and try other seeds.",
-            );
-        }
-    }
-
-    fn calibration(&mut self, result: &DepthMap, truth: &DepthMap) {
-        let Some(line) = line(result, truth) else { return };
-        if (line.slope - 1.0).abs() <= SLOPE_OFF && line.offset.abs() <= OFFSET_OFF_M {
-            return;
-        }
-        let doubled = (line.slope - 0.5).abs() < 0.15 && line.offset > 2.0 * OFFSET_OFF_M;
-        let why = match doubled {
-            true => "Slope 0.5 with half the range's end as offset is the mark of a range that was mapped twice.",
-            false => "A right depth has slope 1 and offset 0: too small a slope flattens the imprint.",
-        };
-        let action = match doubled {
-            true => "Choose the exact inverse.",
-            false => "A refit corrects slope and offset over a whole data set.",
-        };
-        self.caution(
-            FlagKind::Calibration,
-            format!(
-                "The line through prediction against truth has slope {:.2}, offset {}.",
-                line.slope,
-                text_mm(line.offset)
             ),
-            why,
-            action,
-        );
+            (None, None) => {}
+        }
     }
 }

@@ -79,11 +79,6 @@
 //! color sensor has, in place of `range_m`, the `range` of the difference on the 0..255 scale, three channels and no
 //! `shift`. Version 1 has `"sensor": "gelslim"` or `"bubble"` in `input` and none in `output`: the lab's sensors.
 //!
-//! A generator whose denoiser was trained with the condition left out now and then may say so, and is then offered with
-//! classifier-free guidance: `"guidance": { "unconditional": "zero_condition", "scale": 2.0 }`. `unconditional` is
-//! `zero_condition` (a condition of zeros) or `zero_difference` (what the condition encoder makes of a GelSlim that
-//! feels nothing); `scale` is the default, 1 for none. Without the key, guidance is refused.
-//!
 //! A generator that was fitted to pairs of a rig says so: `"fit": { "file": { "path": "fit.npz", "sha256": "…" },
 //! "pads": ["right", "left"], "source": { … } }` ([`FitSpec`], [`touch2touch_core::fit`]).
 //!
@@ -131,7 +126,6 @@ pub use fit::write as write_fit;
 pub use manifest::TimestepType;
 pub(crate) use manifest::{
     BundleSpec, Cast, ClassifierInput, ClassifierSpec, GeneratorInput, GeneratorSpec, InputScale, MaskInput, MaskSpec,
-    Unconditional,
 };
 pub(crate) use origin::BundleFile;
 pub use origin::Origin;

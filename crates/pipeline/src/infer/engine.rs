@@ -224,9 +224,10 @@ impl Graph {
     pub fn load(engine: EngineKind, role: Role, file: &BundleFile) -> Result<Self, EngineError> {
         let bytes =
             file.read(files::MODEL).map_err(|source| EngineError::Read { path: file.path().to_owned(), source })?;
+        let load = |reason| EngineError::Load { engine, role, reason };
         load_session(engine, bytes)
             .map(|session| Self { role, runs: 0, session })
-            .map_err(|err| err.unwrap_or_else(|reason| EngineError::Load { engine, role, reason }))
+            .map_err(|reason| reason.map_or(EngineError::NotInThisBuild, load))
     }
 
     /// Number of runs so far.
@@ -258,28 +259,21 @@ impl Graph {
     }
 }
 
-/// An [`EngineError`] that is already complete, or the engine's text.
-struct LoadFailure(Result<EngineError, String>);
-
-impl LoadFailure {
-    fn unwrap_or_else(self, complete: impl FnOnce(String) -> EngineError) -> EngineError {
-        self.0.unwrap_or_else(complete)
-    }
-}
-
+/// Without a reason where this build has no engine.
 #[cfg(feature = "onnx")]
-fn load_session(engine: EngineKind, bytes: Cow<'static, [u8]>) -> Result<Box<dyn Session>, LoadFailure> {
-    let session: Result<Box<dyn Session>, String> = match engine {
+fn load_session(engine: EngineKind, bytes: Cow<'static, [u8]>) -> Result<Box<dyn Session>, Option<String>> {
+    let on = |provider| ort_engine::load(&bytes, provider).map(|s| Box::new(s) as Box<dyn Session>);
+    let session = match engine {
         EngineKind::Rten => rten_engine::load(bytes).map(|s| Box::new(s) as Box<dyn Session>),
-        EngineKind::Ort => ort_engine::load(&bytes, None).map(|s| Box::new(s) as Box<dyn Session>),
-        EngineKind::On(provider) => ort_engine::load(&bytes, Some(provider)).map(|s| Box::new(s) as Box<dyn Session>),
+        EngineKind::Ort => on(None),
+        EngineKind::On(provider) => on(Some(provider)),
     };
-    session.map_err(|reason| LoadFailure(Err(reason)))
+    session.map_err(Some)
 }
 
 #[cfg(not(feature = "onnx"))]
-fn load_session(_: EngineKind, _: Cow<'static, [u8]>) -> Result<Box<dyn Session>, LoadFailure> {
-    Err(LoadFailure(Ok(EngineError::NotInThisBuild)))
+fn load_session(_: EngineKind, _: Cow<'static, [u8]>) -> Result<Box<dyn Session>, Option<String>> {
+    Err(None)
 }
 
 /// Turns the user's choice into an engine; loads ONNX Runtime's library the first time it is wanted.

@@ -8,12 +8,12 @@ use std::sync::Arc;
 pub use preview::Observer;
 use preview::Watching;
 
-use super::bundle::{Bundle, GeneratorInput, GeneratorSpec, InputScale, Role, TimestepType, Unconditional};
+use super::bundle::{Bundle, GeneratorInput, GeneratorSpec, InputScale, Role, TimestepType};
 use super::engine::{EngineChoice, EngineError, EngineKind, Graph, Input};
 use super::kept_key::KeptKey;
 use super::sandbox::admit;
 use touch2touch_core::diffusion::{
-    Denoiser, DiffusionError, GenerateConfig, Guided, ModelError, Prediction, Progress, Tensor, sample,
+    Denoiser, DiffusionError, GenerateConfig, ModelError, Prediction, Progress, Tensor, sample,
 };
 use touch2touch_core::fit::Fitted;
 use touch2touch_core::grid::{DepthMap, Grid, RgbGrid};
@@ -37,16 +37,6 @@ pub enum GenerateError {
     /// The condition encoder or the decoder failed.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// Guidance was asked of a bundle that was not trained for it.
-    #[error(
-        "the bundle \"{bundle}\" was not trained for guidance (its manifest has no key \"guidance\"), so a scale of {scale} means nothing; leave guidance out, or use another bundle"
-    )]
-    NoGuidance {
-        /// Name of the bundle.
-        bundle: String,
-        /// Scale that was asked for.
-        scale: f64,
-    },
     /// An item names an image that was not given.
     #[error("item of image {image}, but there are {images}")]
     NoImage {
@@ -81,7 +71,6 @@ pub struct Generator {
     encoder: Graph,
     denoiser: Graph,
     decoder: Graph,
-    name: String,
     /// Prepared images and their conditions, the last used last.
     encoded: Vec<(Tensor, Tensor)>,
 }
@@ -112,7 +101,6 @@ impl Generator {
             denoiser: load(Role::Denoiser)?,
             decoder: load(Role::Decoder)?,
             hash: bundle.hash().to_owned(),
-            name: bundle.name().to_owned(),
             encoded: Vec::new(),
             fit: bundle.fit().cloned(),
             spec,
@@ -194,7 +182,6 @@ impl Generator {
         if items.is_empty() {
             return Ok(Vec::new());
         }
-        self.check_guidance(config)?;
         let conditions: Vec<Option<Tensor>> = (0..images.len())
             .map(|at| {
                 // An image that no item is of is not encoded.
@@ -207,22 +194,11 @@ impl Generator {
         };
         let condition = items.iter().map(of_item).collect::<Result<Vec<_>, _>>()?;
         let condition = Tensor::stack(&condition).expect("conditions have one shape and there is at least one");
-        let blank = match self.spec.guidance.filter(|_| config.guidance != 1.0) {
-            Some(guidance) => Some(self.blank(guidance.unconditional)?),
-            None => None,
-        };
-
         let seeds: Vec<u64> = items.iter().map(|item| item.seed).collect();
         let spec = &self.spec;
         let mut plain = BundleDenoiser { graph: &mut self.denoiser, spec, at_once: &mut self.at_once };
         let mut watch = Watching::new(observer, &mut self.decoder, spec, items.len());
-        let latent = match blank {
-            None => sample(&mut plain, &spec.schedule, config, &seeds, &condition, &mut watch),
-            Some(blank) => {
-                let mut guided = Guided::new(&mut plain, blank, config.guidance);
-                sample(&mut guided, &spec.schedule, config, &seeds, &condition, &mut watch)
-            }
-        };
+        let latent = sample(&mut plain, &spec.schedule, config, &seeds, &condition, &mut watch);
         let latent = latent.map_err(|err| match err {
             DiffusionError::Cancelled => GenerateError::Cancelled,
             DiffusionError::Model(err) => GenerateError::Model(err),
@@ -258,31 +234,9 @@ impl Generator {
         Ok(condition)
     }
 
-    /// Checks that the bundle can be guided as asked.
-    ///
-    /// # Errors
-    /// [`GenerateError::NoGuidance`] for a scale other than 1 and a bundle that was not trained for it.
-    pub fn check_guidance(&self, config: &GenerateConfig) -> Result<(), GenerateError> {
-        if config.guidance != 1.0 && self.spec.guidance.is_none() {
-            return Err(GenerateError::NoGuidance { bundle: self.name.clone(), scale: config.guidance });
-        }
-        Ok(())
-    }
-
     /// Forgets the conditions of images seen before, as if freshly loaded: for measuring.
     pub fn forget_conditions(&mut self) {
         self.encoded.clear();
-    }
-
-    /// The condition that says nothing.
-    fn blank(&mut self, unconditional: Unconditional) -> Result<Tensor, GenerateError> {
-        match unconditional {
-            Unconditional::ZeroCondition => Ok(Tensor::filled(self.spec.condition.shape.to_vec(), 0.0)),
-            Unconditional::ZeroDifference => {
-                let [width, height] = self.spec.input.size;
-                self.condition(&RgbGrid::filled(width, height, [0.0; 3]))
-            }
-        }
     }
 
     /// The three graphs, for measuring what they take by themselves: condition encoder, denoiser, decoder.

@@ -69,7 +69,6 @@ mod tests {
             GenerateConfig { steps: 51, ..config },
             GenerateConfig { sampler: Sampler::Ddpm, ..config },
             GenerateConfig { spacing: Spacing::Lab, ..config },
-            GenerateConfig { guidance: 2.0, ..config },
         ];
         for other in &others {
             assert_ne!((key(&config), key(&config).id()), (key(other), key(other).id()));

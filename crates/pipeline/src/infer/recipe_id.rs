@@ -13,7 +13,7 @@ use touch2touch_core::diffusion::{GenerateConfig, Sampler, Spacing};
 const VERSION: &str = "r1";
 /// The choices of a generation that an id does not name. Part of the format: they stay when defaults change.
 const UNNAMED: GenerateConfig =
-    GenerateConfig { steps: 50, eta: 0.0, seed: 42, sampler: Sampler::Ddim, spacing: Spacing::Trailing, guidance: 1.0 };
+    GenerateConfig { steps: 50, eta: 0.0, seed: 42, sampler: Sampler::Ddim, spacing: Spacing::Trailing };
 
 /// A digest of all that decides a result: equal ids are equal results of the same touch. Choices are named in it and those
 /// at their defaults left out, so that a new choice changes no id.
@@ -37,7 +37,7 @@ impl Named {
         named.add("imprint", &"predicted", &"measured");
         named.add("bundle", &bundle, &Value::Null);
         // + 0.0 turns -0 into 0, which means the same.
-        let config = GenerateConfig { eta: config.eta + 0.0, guidance: config.guidance + 0.0, ..*config };
+        let config = GenerateConfig { eta: config.eta + 0.0, ..*config };
         let (Value::Object(choices), Value::Object(defaults)) = (json(&config), json(&UNNAMED)) else {
             unreachable!("choices are named")
         };

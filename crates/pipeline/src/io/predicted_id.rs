@@ -30,7 +30,7 @@ impl PredictedId {
     /// The prediction of a generator (its bundle's identity) with these choices.
     pub fn new(bundle: &str, config: &GenerateConfig, shift: ShiftMode) -> Self {
         // + 0.0 turns -0 into 0, which means the same.
-        let config = GenerateConfig { eta: config.eta + 0.0, guidance: config.guidance + 0.0, ..*config };
+        let config = GenerateConfig { eta: config.eta + 0.0, ..*config };
         let mut named = object(serde_json::to_value(config));
         named.insert("shift".into(), serde_json::to_value(shift).unwrap_or_default());
         let unnamed = unnamed();
@@ -52,6 +52,10 @@ impl PredictedId {
     pub fn parts(&self) -> Option<(&str, GenerateConfig, ShiftMode)> {
         let (bundle, choices) = self.0.split_once(' ')?;
         let named: Map<String, Value> = serde_json::from_str(choices.strip_prefix(VERSION)?).ok()?;
+        // What was made with a choice that there is no longer cannot be made again.
+        if named.contains_key("guidance") || named.get("sampler").is_some_and(|sampler| sampler == "dpm_solver2m") {
+            return None;
+        }
         let mut all = unnamed();
         for (choice, value) in named {
             *all.get_mut(&choice)? = value;

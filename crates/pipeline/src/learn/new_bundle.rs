@@ -18,16 +18,23 @@ pub fn models_folder() -> Option<PathBuf> {
     folders::program_data().map(|folder| folder.join("models"))
 }
 
+fn unwritable(what: &str, file: &Path, err: std::io::Error) -> TaskError {
+    TaskError::new(what, format!("cannot be written: {err} ({})", file.display()))
+}
+
+/// Where a bundle goes, with the folders above it made and swept.
+fn place(what: &str, out: &Path) -> Result<PathBuf, TaskError> {
+    let place = std::path::absolute(out).map_err(|err| unwritable(what, out, err))?;
+    let parent = place.parent().unwrap_or(&place);
+    std::fs::create_dir_all(parent).map_err(|err| unwritable(what, parent, err))?;
+    staging::sweep(parent);
+    Ok(place)
+}
+
 /// Keeps a folder for a bundle that is to be made, until the answer is dropped.
 pub(crate) fn claim(what: &str, out: &Path) -> Result<Claim, TaskError> {
-    let io = |file: &Path, err: std::io::Error| {
-        TaskError::new(what, format!("cannot be written: {err} ({})", file.display()))
-    };
-    let place = std::path::absolute(out).map_err(|err| io(out, err))?;
-    let parent = place.parent().unwrap_or(&place);
-    std::fs::create_dir_all(parent).map_err(|err| io(parent, err))?;
-    staging::sweep(parent);
-    Claim::of(&place).map_err(|err| io(out, err))?.ok_or_else(|| {
+    let place = place(what, out)?;
+    Claim::of(&place).map_err(|err| unwritable(what, out, err))?.ok_or_else(|| {
         TaskError::new(what, format!("a bundle is being made in {} already", out.display()))
             .with_hint("Wait for the other run, or name another folder.")
     })
@@ -67,14 +74,9 @@ pub(crate) fn write(
     change: impl FnOnce(&Path, &mut Value) -> Result<(), TaskError>,
 ) -> Result<(), TaskError> {
     let source = from.open(what)?;
-    let io = |file: &Path, err: std::io::Error| {
-        TaskError::new(what, format!("cannot be written: {err} ({})", file.display()))
-    };
-    let place = std::path::absolute(out).map_err(|err| io(out, err))?;
-    let parent = place.parent().unwrap_or(&place);
-    std::fs::create_dir_all(parent).map_err(|err| io(parent, err))?;
-    staging::sweep(parent);
-    let staging = Staging::new(&place).map_err(|err| io(parent, err))?;
+    let io = |file: &Path, err| unwritable(what, file, err);
+    let place = place(what, out)?;
+    let staging = Staging::new(&place).map_err(|err| io(&place, err))?;
     let folder = staging.new_content();
     std::fs::create_dir(&folder).map_err(|err| io(&folder, err))?;
     let read = |name: &str| {

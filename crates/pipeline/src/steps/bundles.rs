@@ -5,7 +5,6 @@ use std::sync::Arc;
 
 use crate::error::TaskError;
 use crate::infer::bundle::{self, Bundle, BundleSpec, Ends, Misfit, Origin, SensorPair};
-use crate::infer::generator::GenerateError;
 use touch2touch_core::dataset::Problem;
 use touch2touch_core::diffusion::{GenerateConfig, Sampler};
 use touch2touch_core::fit::FitSource;
@@ -39,8 +38,6 @@ pub struct GeneratorInfo {
     pub defaults: GenerateConfig,
     /// The steps of its training: no more can be taken.
     pub training_steps: usize,
-    /// True where it was trained for guidance.
-    pub guided: bool,
     /// The sensors between which it predicts.
     pub sensors: SensorPair,
     /// From what it was fitted to a rig, if it was.
@@ -97,7 +94,6 @@ impl BundleInfo {
             generator: bundle.generator().map(|spec| GeneratorInfo {
                 defaults: spec.defaults,
                 training_steps: spec.schedule.training_steps(),
-                guided: spec.guidance.is_some(),
                 sensors: spec.sensors(),
                 fit: spec.fit.as_ref().map(|fit| fit.source.clone()),
             }),
@@ -149,17 +145,6 @@ impl BundleInfo {
     /// True where it can be used with the sensors of `rig`.
     pub fn fits(&self, rig: &Rig) -> bool {
         self.ends(rig).is_none_or(|ends| ends.is_ok())
-    }
-
-    /// # Errors
-    /// If `scale` guides and the generator was not trained for guidance.
-    pub fn check_guidance(&self, scale: f64) -> Result<(), GenerateError> {
-        match &self.generator {
-            Some(generator) if !generator.guided && scale != 1.0 => {
-                Err(GenerateError::NoGuidance { bundle: self.name.clone(), scale })
-            }
-            _ => Ok(()),
-        }
     }
 
     /// Opens it again. It must still be the same: its identity is part of every recipe.

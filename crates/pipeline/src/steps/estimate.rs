@@ -240,7 +240,7 @@ impl Estimate {
         Ok(self)
     }
 
-    /// The pose by a registration that no recipe names, such as one with the traps of the lab's.
+    /// The pose by a registration that no recipe names.
     ///
     /// # Errors
     /// Why there is none.

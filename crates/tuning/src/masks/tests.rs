@@ -55,30 +55,30 @@ fn iou(tuner: &MaskTuner, of_start: bool) -> f64 {
 
 #[test]
 fn the_loss_falls_and_unseen_touches_are_told_better() {
-    let (tuner, losses) = run(MaskTuner::new(&start(), touches(8), config()).unwrap());
+    let (tuner, losses) = run(MaskTuner::new(&start(), touches(8), config(), None).unwrap());
     let mean = |losses: &[f32]| losses.iter().sum::<f32>() / losses.len() as f32;
     assert!(mean(&losses[150..]) < 0.6 * mean(&losses[..5]), "{losses:?}");
     let (before, after) = (iou(&tuner, true), iou(&tuner, false));
     assert!(after > 0.8 && after > before + 0.2, "{before} {after}");
     assert_eq!(tuner.tuned().len(), start().file.len());
     // The file holds what was learned.
-    let again = MaskTuner::new(&MaskStart { file: tuner.tuned(), ..start() }, touches(8), config()).unwrap();
+    let again = MaskTuner::new(&MaskStart { file: tuner.tuned(), ..start() }, touches(8), config(), None).unwrap();
     assert!((iou(&again, true) - after).abs() < 1e-9);
 }
 
 #[test]
 fn a_run_that_is_stopped_goes_on_to_the_same_last_bit_on_any_number_of_threads() {
     let config = |threads| MaskConfig { steps: 7, threads: Some(threads), ..config() };
-    let (whole, _) = run(MaskTuner::new(&start(), touches(5), config(1)).unwrap());
+    let (whole, _) = run(MaskTuner::new(&start(), touches(5), config(1), None).unwrap());
     for (stop, threads) in [(1, 2), (6, 4)] {
-        let mut first = MaskTuner::new(&start(), touches(5), config(2)).unwrap();
+        let mut first = MaskTuner::new(&start(), touches(5), config(2), None).unwrap();
         (0..stop).for_each(|_| assert!(first.step().is_ok()));
         let (bytes, _) = (first.to_bytes(), first);
-        let resumed = MaskTuner::resume(&start(), touches(5), config(threads), &bytes).unwrap();
+        let resumed = MaskTuner::new(&start(), touches(5), config(threads), Some(&bytes)).unwrap();
         assert_eq!(resumed.steps_done(), stop);
         let (resumed, _) = run(resumed);
         assert!(resumed.to_bytes() == whole.to_bytes() && resumed.tuned() == whole.tuned());
-        let other = MaskTuner::resume(&start(), touches(4), config(1), &bytes);
+        let other = MaskTuner::new(&start(), touches(4), config(1), Some(&bytes));
         assert!(matches!(other, Err(Error::State(_))));
     }
 }
@@ -94,14 +94,14 @@ fn what_does_not_count_changes_nothing() {
     for touch in &mut wrong {
         touch.contact.iter_mut().skip(2).step_by(5).for_each(|contact| *contact = !*contact);
     }
-    let tuned = |touches| run(MaskTuner::new(&start(), touches, config.clone()).unwrap()).0.tuned();
+    let tuned = |touches| run(MaskTuner::new(&start(), touches, config.clone(), None).unwrap()).0.tuned();
     assert!(tuned(plain.clone()) == tuned(wrong));
     assert!(tuned(plain) != tuned(touches(4)));
 }
 
 #[test]
 fn what_cannot_be_learned_from_is_refused_and_says_why() {
-    let new = |touches, config| MaskTuner::new(&start(), touches, config).map(drop);
+    let new = |touches, config| MaskTuner::new(&start(), touches, config, None).map(drop);
     assert_eq!(new(Vec::new(), config()), Err(Error::NoPairs));
     let none = MaskTouch { counted: Some(vec![false; SIZE[0] * SIZE[1]]), ..touches(1).remove(0) };
     assert_eq!(new(vec![none], config()), Err(Error::NoPairs));
@@ -114,9 +114,9 @@ fn what_cannot_be_learned_from_is_refused_and_says_why() {
     assert!(matches!(new(blank, config()), Err(Error::Mask { index: 0, .. })));
     assert!(matches!(new(touches(1), MaskConfig { steps: 0, ..config() }), Err(Error::Start { .. })));
     let other = MaskStart { file: fixture::start().decoder, ..start() };
-    assert!(matches!(MaskTuner::new(&other, touches(1), config()), Err(Error::Missing { .. })));
+    assert!(matches!(MaskTuner::new(&other, touches(1), config(), None), Err(Error::Missing { .. })));
     let falling = MaskStart { range_m: [0.02, -0.01], ..start() };
-    assert!(matches!(MaskTuner::new(&falling, touches(1), config()), Err(Error::Start { .. })));
+    assert!(matches!(MaskTuner::new(&falling, touches(1), config(), None), Err(Error::Start { .. })));
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! [`placed`]: a drawn picture as a pad's sensor sees it: through a line, moved, with a field on top.
 
-use crate::image::{Tap, taps};
+use crate::image::{Tap, shifted, taps};
 use crate::tape::Tensor;
 
 /// Pictures `[n, side, side]` through the line `[2]` (factor and offset), moved by their pad's shift (of `[pads, 2]`, rows
@@ -12,9 +12,9 @@ pub fn placed(drawn: &Tensor, line: &Tensor, shifts: &Tensor, fields: &Tensor, p
     let mut values = drawn.values().to_vec();
     for (seen, pad) in values.chunks_exact_mut(pixels).zip(pads) {
         let Some(pad) = *pad else { continue };
-        let place = Place::new(side, shifts.values(), pad);
+        let shift = [0, 1].map(|axis| f64::from(shifts.values()[2 * pad + axis]));
         let lined: Vec<f32> = seen.iter().map(|v| v * line.values()[0] + line.values()[1]).collect();
-        let moved = place.down(&place.across(&lined));
+        let moved = shifted(&lined, side, shift);
         let field = &fields.values()[pad * pixels..][..pixels];
         seen.iter_mut().zip(moved).zip(field).for_each(|((seen, moved), field)| *seen = moved + field);
     }
@@ -55,19 +55,6 @@ impl Place {
         let rows = image.chunks_exact(self.side);
         rows.flat_map(|row| self.columns.iter().map(|tap| tap.between(row[tap.low], row[tap.low + 1]))).collect()
     }
-
-    fn down(&self, image: &[f32]) -> Vec<f32> {
-        let mut moved = Vec::with_capacity(image.len());
-        for tap in &self.rows {
-            let (upper, lower) = self.two_rows(image, tap);
-            moved.extend(upper.iter().zip(lower).map(|(&upper, &lower)| tap.between(upper, lower)));
-        }
-        moved
-    }
-
-    fn two_rows<'a>(&self, image: &'a [f32], tap: &Tap) -> (&'a [f32], &'a [f32]) {
-        image[tap.low * self.side..][..2 * self.side].split_at(self.side)
-    }
 }
 
 /// Slopes along the inputs; that along the drawn pictures begins as the one along the result.
@@ -92,7 +79,7 @@ impl InputSlopes {
         let mut along_across = vec![0.0; slope.len()];
         let mut down = 0.0f64;
         for (tap, slope) in place.rows.iter().zip(slope.chunks_exact(side)) {
-            let (upper, lower) = place.two_rows(&across, tap);
+            let (upper, lower) = across[tap.low * side..][..2 * side].split_at(side);
             let (to_upper, to_lower) = along_across[tap.low * side..][..2 * side].split_at_mut(side);
             for (x, &slope) in slope.iter().enumerate() {
                 to_upper[x] += slope * (1.0 - tap.part);

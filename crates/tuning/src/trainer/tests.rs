@@ -41,7 +41,7 @@ fn trainer(threads: usize, steps: usize) -> Trainer<Vector> {
     let mut start = Params::default();
     start.push("vector", vec![3], vec![0.0; 3]);
     start.push("fixed", vec![2], vec![7.0; 2]);
-    Trainer::new(Vector, start, Plan { ramp: Ramp { warm_up: 5, steps, rest: 0.02 }, clip: 1.0, threads })
+    Trainer::new(Vector, start, steps, Some(threads))
 }
 
 fn origin(name: &str) -> Origin {
@@ -122,8 +122,7 @@ impl Objective for Broken {
 fn a_loss_that_is_no_number_leaves_the_weights_alone() {
     let mut start = Params::default();
     start.push("x", vec![1], vec![1.0]);
-    let plan = Plan { ramp: Ramp { warm_up: 1, steps: 9, rest: 0.02 }, clip: 1.0, threads: 2 };
-    let mut trainer = Trainer::new(Broken, start, plan);
+    let mut trainer = Trainer::new(Broken, start, 9, Some(2));
     for _ in 0..2 {
         trainer.step().unwrap();
     }

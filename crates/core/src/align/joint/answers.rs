@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::cost::Joint;
-use super::problem::{LAST, Problem, alike};
+use super::problem::{KERNELS_M, LAST, POINTS, Problem, alike};
 use crate::align::batch::State;
 use crate::align::search::Cost as _;
 use crate::align::{AlignReport, Range};
@@ -67,7 +67,7 @@ impl Problem<'_> {
         if !least.is_finite() {
             return shared(vec![(report.grasp_from_object, 1.0)], symmetry, report.range);
         }
-        let telling = self.telling(&self.patches_at(self.answer_band(), self.config().points[LAST], own), own);
+        let telling = self.telling(&self.patches_at(self.answer_band(), POINTS[LAST], own), own);
         let chance = |cost: f64| (-0.5 * COUNTS * telling * (cost - least)).exp();
         let sum: f64 = distinct.iter().map(|(_, cost)| chance(*cost)).sum();
         distinct[1..].sort_by(|a, b| a.1.total_cmp(&b.1));
@@ -94,8 +94,8 @@ impl Problem<'_> {
         let band = self.answer_band();
         let middle = State { phi: a.phi, place: 0.5 * (a.place + b.place) };
         let [from, half, to] = [a, middle, b].map(|at| {
-            let fingers = self.patches_at(band, self.config().points[LAST - 1], at);
-            Joint { fingers: &fingers, kernel_m: self.config().kernels_m[LAST], mask: None, lookups: 0 }.sums(at).cost
+            let fingers = self.patches_at(band, POINTS[LAST - 1], at);
+            Joint { fingers: &fingers, kernel_m: KERNELS_M[LAST], mask: None, lookups: 0 }.sums(at).cost
         });
         half <= from.max(to) * (1.0 + VALLEY)
     }

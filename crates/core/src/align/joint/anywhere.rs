@@ -7,7 +7,7 @@
 use std::sync::Arc;
 
 use super::cost::Patch;
-use super::problem::{Descents, LAST, Problem, alike};
+use super::problem::{Descents, LAST, Problem, SCOUTS_WEIGHT, alike};
 use super::turned::{Frame, REACH, TURNS, Turned};
 use crate::align::batch::State;
 use crate::align::lanes::LANES;
@@ -80,7 +80,7 @@ impl Problem<'_> {
         found
             .into_iter()
             .map(|(_, state)| state)
-            .filter(|state| self.config().allows(state.to_pose(self.centroid())))
+            .filter(|state| self.config.allows(state.to_pose(self.centroid())))
             .take(KEEP[0])
             .collect()
     }
@@ -91,14 +91,14 @@ impl Problem<'_> {
         for stage in 0..LAST {
             let mut ends: Vec<(State, Progress)> = Vec::with_capacity(runs.len());
             for (start, mut at) in runs {
-                descents.descend(ends.len(), &mut at, stage, self.config().weight.scouts);
+                descents.descend(ends.len(), &mut at, stage, SCOUTS_WEIGHT);
                 match ends.iter_mut().find(|(_, end)| alike(&end.state, &at.state)) {
                     Some(end) if end.1.cost > at.cost => *end = (start, at),
                     Some(_) => {}
                     None => ends.push((start, at)),
                 }
             }
-            ends.retain(|(_, at)| self.config().allows(at.state.to_pose(self.centroid())));
+            ends.retain(|(_, at)| self.config.allows(at.state.to_pose(self.centroid())));
             ends.sort_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
             ends.truncate(KEEP.get(stage + 1).copied().unwrap_or(count));
             runs = ends;

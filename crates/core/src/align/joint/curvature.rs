@@ -42,7 +42,7 @@ impl Problem<'_> {
     /// Information of what the mean cost of patches rises by: twice the logarithm of how much less likely a pose is.
     pub(super) fn telling(&self, patches: &Patches, at: State) -> f64 {
         let noise_m = noise_m(Relief::of(patches, at, KERNEL_M).residuals_m).max(1e-6);
-        let shared_m = match (self.is_predicted(), self.hangs()) {
+        let shared_m = match (self.predicted, self.hangs()) {
             (true, _) => PREDICTED_SHARED_M,
             (false, true) => HANGING_SHARED_M,
             (false, false) => SHARED_M,

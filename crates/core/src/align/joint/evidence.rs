@@ -9,7 +9,7 @@ use super::cost::{Joint, Relief};
 use super::problem::{Patches, Problem};
 use crate::align::batch::State;
 use crate::align::search::{Cost, Progress, minimize};
-use crate::align::{AlignReport, Contacts, PadImage, Range, Scene, Uncertainty};
+use crate::align::{AlignReport, Ask, Contacts, PadImage, Prior, Range, Scene, Uncertainty};
 use crate::mesh::sampling::spread;
 use crate::symmetry::Symmetry;
 use crate::tool::ToolModel;
@@ -97,8 +97,8 @@ impl Evidence {
             .iter()
             .filter(|&&i| tool.field.sample(object_from_grasp.transform_yz(*finite[i])).distance <= ON_TOOL_M);
         let on_tool = on.count() as f64 / chosen.len().max(1) as f64;
-        let config = JointConfig { range: report.range, ..JointConfig::default() };
-        let problem = Problem::new(scene, tool, &config).ok().flatten();
+        let config = JointConfig { range: report.range };
+        let problem = Problem::new(scene, tool, config, Ask::default()).ok().flatten();
         let found = problem.as_ref().map(|problem| problem.evidence(scene, State::from_pose(pose, problem.centroid())));
         let by_membrane = report.joint.is_some_and(|fit| fit.basis.has_membrane());
         let uncertainty = match (&problem, found) {
@@ -157,9 +157,9 @@ impl Problem<'_> {
         }
         let images = [PadImage { camera: a.camera, ..*b }, PadImage { camera: b.camera, ..*a }];
         let scene = Scene::new(Contacts { points: &[], images: &images });
-        let swapped = Problem::new(&scene, self.tool(), self.config()).ok()??;
-        let beyond = !self.config().mask.prior.allows(at.to_pose(self.centroid()));
-        let end = swapped.solve(beyond && self.config().is_wider()).end();
+        let swapped = Problem::new(&scene, self.tool, self.config, Ask::default()).ok()??;
+        let beyond = !Prior::default().allows(at.to_pose(self.centroid()));
+        let end = swapped.solve(beyond && self.config.is_wider()).end();
         Some(Relief::of(&swapped.patches_at(LOOK.band, LOOK.places, end), end, LOOK.kernel_m).misfit())
     }
 }

@@ -11,12 +11,14 @@ use super::image::Image;
 use super::smooth::BANDS;
 use super::template::{BandField, Grasp, Template, grasp_of, template};
 use super::turned::{Frame, Turned, turned};
-use super::{Basis, JointConfig, JointFit};
+use super::{Basis, JointConfig, JointFit, PREDICTED_EXPLAINED};
 use crate::align::batch::{Cloud, State};
 use crate::align::observability::of_cloud;
 use crate::align::planar::fits;
 use crate::align::search::{Progress, Search, minimize};
-use crate::align::{ANGLE_SCALE_M, AlignError, AlignReport, MIN_POINTS, Run, Rung, Scene, TraceStep, clean};
+use crate::align::{
+    ANGLE_SCALE_M, AlignError, AlignReport, Ask, MIN_POINTS, Prior, Run, Rung, Scene, TraceStep, clean,
+};
 use crate::frames::PlanarPose;
 use crate::mesh::sampling::spread;
 use crate::tent::FreeShape;
@@ -24,8 +26,37 @@ use crate::tool::ToolModel;
 
 /// Smallest area of the membranes that is compared, square meters.
 const MIN_AREA_M2: f64 = 1e-4;
-/// Position in [`JointConfig::points`] of what decides the answer.
+/// Places of the membranes that are compared in each band, coarse to fine, and for the answer (in the finest).
+pub(super) const POINTS: [usize; LAST + 1] = [100, 150, 400, 1200];
+/// Position in [`POINTS`] of what decides the answer.
 pub(super) const LAST: usize = 3;
+/// Widths of the Geman-McClure kernel likewise, meters.
+pub(super) const KERNELS_M: [f64; LAST + 1] = [4e-3, 1e-3, 0.5e-3, 0.5e-3];
+/// Points of the mask while starts are told apart, and for the answer.
+const MASK_POINTS: [usize; 2] = [64, 400];
+/// Widths of the mask's kernel, meters, likewise.
+const MASK_KERNELS_M: [f64; 2] = [2e-3, 1e-3];
+/// Weight of the mask's mean cost beside the membrane's while starts are told apart.
+pub(super) const SCOUTS_WEIGHT: f64 = 0.1;
+/// The same for the answer, where the membrane has the noise of [`NOISE_M`]. It grows with the fourth power of the noise: what the
+/// membrane tells falls with the square of the noise, and model errors make its residuals alike.
+const WEIGHT: f64 = 0.02;
+const NOISE_M: f64 = 0.075e-3;
+/// Least and greatest weight for the answer.
+const WEIGHTS: [f64; 2] = [0.02, 0.3];
+/// Least weight beside predicted images: their errors are no noise, so that nothing is seen of them in the images.
+const PREDICTED_WEIGHT: f64 = 0.3;
+/// Mean cost of the mask at the membrane's pose from which on it counts less, by its inverse.
+const AGREES: f64 = 0.1;
+/// Costs this close, as a share, do not tell two ends apart.
+const CLOSE: f64 = 0.15;
+/// Share of the membrane's relief that an answer from the prior must explain, or scouts start all around: of a membrane that
+/// hangs from the tool, and of one that reaches the middle plane.
+const STANDS: [f64; 2] = [0.3, 0.4];
+/// Share of its cost that another pose must be ahead of it.
+const AHEAD: f64 = 0.03;
+/// Most steps in each band.
+const STEPS: usize = 20;
 /// Kernels of the mask's own scouts, meters, wide to narrow.
 const MASK_SCOUTS_M: [f64; 2] = [8e-3, 2e-3];
 /// Angles of further starts as shares of the prior's, by rung.
@@ -36,38 +67,7 @@ pub(super) const STEPS_M: [f64; 4] = [1e-4, 5e-5, 5e-5, 1e-5];
 /// Ends of scouts from all around that are refined.
 const ENDS: usize = 4;
 /// Most steps of scouts that start all around, and of the last descent.
-const STEPS_AROUND: [usize; LAST + 1] = [6, 8, 12, 20];
-
-/// Refuses settings that make no sense.
-pub(super) fn check(config: &JointConfig) -> Result<(), AlignError> {
-    let bad = |what| Err(AlignError::Config { what });
-    let positive = |x: &f64| x.is_finite() && *x > 1e-6;
-    if config.starts.iter().any(|s| !s.is_finite()) {
-        return bad("starts");
-    }
-    if config.points.iter().chain(&config.mask_points).any(|n| *n < MIN_POINTS) {
-        return bad("points");
-    }
-    if !config.kernels_m.iter().chain(&config.mask_kernels_m).all(positive) {
-        return bad("kernels_m");
-    }
-    let weight = &config.weight;
-    if ![weight.scouts, weight.answer, weight.noise_m, weight.range[0], weight.predicted, weight.agrees]
-        .iter()
-        .all(positive)
-        || weight.range[1] < weight.range[0]
-        || !weight.range[1].is_finite()
-    {
-        return bad("weight");
-    }
-    if config.max_iterations == 0 {
-        return bad("max_iterations");
-    }
-    if !(config.mask.gap > 0.0 && config.mask.gap < 1.0) {
-        return bad("gap");
-    }
-    Ok(())
-}
+const STEPS_AROUND: [usize; LAST + 1] = [6, 8, 12, STEPS];
 
 /// A finger's image and its template.
 struct Finger {
@@ -81,8 +81,9 @@ pub(super) type Patches = Vec<(Arc<BandField>, Rc<Patch>)>;
 
 /// A question prepared for every band.
 pub(super) struct Problem<'a> {
-    tool: &'a ToolModel,
-    config: &'a JointConfig,
+    pub(super) tool: &'a ToolModel,
+    pub(super) config: JointConfig,
+    ask: Ask<'a>,
     fingers: Vec<Finger>,
     /// Mean of the places of the membranes, about which everything turns, `(y, z)`, meters.
     centroid: DVec2,
@@ -91,7 +92,7 @@ pub(super) struct Problem<'a> {
     not_finite: usize,
     free: FreeShape,
     /// True where a model predicted the images.
-    predicted: bool,
+    pub(super) predicted: bool,
 }
 
 /// Outcome of a search: its starts and their runs.
@@ -133,22 +134,21 @@ fn under(patches: &Patches, templates: &[Arc<Template>], band: usize) -> Patches
 impl Descents<'_, '_> {
     /// Goes down on one band.
     pub(super) fn descend(&mut self, run: usize, at: &mut Progress, stage: usize, weight: f64) {
-        let config = self.problem.config;
         // A template for each place is worth its making where the answer is decided.
         let problem = self.problem;
         let grasp = if self.around { problem.grasp(at.state, stage == LAST) } else { Grasp::default() };
         let templates = problem.templates(grasp);
         let fingers = &under(&self.patches[stage], &templates, stage.min(problem.answer_band()));
-        let steps = if self.around { STEPS_AROUND[stage].min(config.max_iterations) } else { config.max_iterations };
+        let steps = if self.around { STEPS_AROUND[stage] } else { STEPS };
         let last = usize::from(stage == LAST);
         let mask = self.problem.mask.as_ref().map(|clouds| MaskPart {
             field: &self.problem.tool.field,
             cloud: &clouds[last],
-            kernel_m: config.mask_kernels_m[last],
+            kernel_m: MASK_KERNELS_M[last],
             weight,
         });
-        let mut joint = Joint { fingers, kernel_m: config.kernels_m[stage], mask, lookups: 0 };
-        let trace = config.record.then_some(&mut self.trace);
+        let mut joint = Joint { fingers, kernel_m: KERNELS_M[stage], mask, lookups: 0 };
+        let trace = self.problem.ask.record.then_some(&mut self.trace);
         let mut noted = Noted { cost: &mut joint, run, centroid: self.problem.centroid, trace };
         let sums = minimize(&mut noted, at, steps, STEPS_M[stage]);
         (at.cost, at.inliers, at.inlier_squares) = (sums.cost, sums.inliers, sums.inlier_squares);
@@ -160,7 +160,7 @@ impl Descents<'_, '_> {
         let problem = self.problem;
         let templates = problem.templates(problem.grasp(state, true));
         let fingers = under(&self.patches[LAST], &templates, problem.answer_band());
-        let relief = Relief::of(&fingers, state, problem.config.kernels_m[LAST]);
+        let relief = Relief::of(&fingers, state, KERNELS_M[LAST]);
         (relief.explained(), noise_m(relief.residuals_m))
     }
 
@@ -171,7 +171,7 @@ impl Descents<'_, '_> {
                 *at = Progress { iterations: at.iterations, ..*met };
                 return;
             }
-            self.descend(runs.len(), at, stage, self.problem.config.weight.scouts);
+            self.descend(runs.len(), at, stage, SCOUTS_WEIGHT);
         }
     }
 }
@@ -188,7 +188,8 @@ impl<'a> Problem<'a> {
     pub(super) fn new(
         scene: &Scene<'_>,
         tool: &'a ToolModel,
-        config: &'a JointConfig,
+        config: JointConfig,
+        ask: Ask<'a>,
     ) -> Result<Option<Self>, AlignError> {
         let finite = tool.mesh.vertices.iter().filter(|v| v.is_finite());
         let tops = finite.fold([0f64; 2], |[low, high], v| [low.max(-v.x), high.max(v.x)]);
@@ -224,26 +225,18 @@ impl<'a> Problem<'a> {
         };
         let not_finite = scene.yz().iter().filter(|p| !p.is_finite()).count();
         let mask = cleaned.map(|cleaned| {
-            config.mask_points.map(|count| {
+            MASK_POINTS.map(|count| {
                 let points = &cleaned.points;
                 Cloud::new(spread(points.len(), count).into_iter().map(|i| points[i] - centroid))
             })
         });
         let predicted = scene.images().iter().any(|image| image.predicted);
-        Ok(Some(Self { tool, config, fingers, centroid, mask, not_finite, predicted, free }))
+        Ok(Some(Self { tool, config, ask, fingers, centroid, mask, not_finite, predicted, free }))
     }
 
     /// The point about which everything turns, `(y, z)`, meters.
     pub(super) fn centroid(&self) -> DVec2 {
         self.centroid
-    }
-
-    pub(super) fn tool(&self) -> &ToolModel {
-        self.tool
-    }
-
-    pub(super) fn config(&self) -> &JointConfig {
-        self.config
     }
 
     /// The answer without the mask, if there is one to leave out and that answer is better by `gain` of what the tool explains;
@@ -260,7 +253,7 @@ impl<'a> Problem<'a> {
 
     /// The images as a stage compares them.
     fn patches(&self, stage: usize) -> Patches {
-        self.patches_of(stage.min(self.answer_band()), self.config.points[stage])
+        self.patches_of(stage.min(self.answer_band()), POINTS[stage])
     }
 
     /// Band that decides the answer: the finest that is not noise. To a membrane that hangs from the tool, and to a predicted one,
@@ -272,10 +265,6 @@ impl<'a> Problem<'a> {
     /// True where the free membrane does not reach the middle plane.
     pub(super) fn hangs(&self) -> bool {
         !self.free.reaches
-    }
-
-    pub(super) fn is_predicted(&self) -> bool {
-        self.predicted
     }
 
     /// About `points` places of the images in a band.
@@ -307,7 +296,7 @@ impl<'a> Problem<'a> {
     /// The grasp of a state, or that of the lab's where it is one; by its turn alone where the place is not asked for.
     pub(super) fn grasp(&self, at: State, place: bool) -> Grasp {
         let pose = at.to_pose(self.centroid);
-        if self.config.mask.prior.allows(pose) || !self.config.is_wider() {
+        if Prior::default().allows(pose) || !self.config.is_wider() {
             return Grasp::default();
         }
         let [turn, y, z] = grasp_of(pose);
@@ -324,7 +313,7 @@ impl<'a> Problem<'a> {
     }
 
     fn allowed(&self, at: &Progress) -> bool {
-        self.config.mask.prior.allows(at.state.to_pose(self.centroid))
+        Prior::default().allows(at.state.to_pose(self.centroid))
     }
 
     pub(super) fn descents(&self) -> Descents<'_, 'a> {
@@ -336,9 +325,8 @@ impl<'a> Problem<'a> {
     /// is alone, has a rival of nearly its cost elsewhere, or lies where no gripper holds a tool. Then the best two are
     /// refined. Where that answer does not stand, scouts may start all around.
     pub(super) fn solve(&self, around: bool) -> Answer {
-        let config = self.config;
-        let own = config.starts.is_empty();
-        let mut starts = if own { vec![PlanarPose::default()] } else { config.starts.clone() };
+        let own = self.ask.starts.is_none();
+        let mut starts = self.ask.starts.map_or_else(|| vec![PlanarPose::default()], <[_]>::to_vec);
         let mut descents = self.descents();
         let mut runs: Vec<Progress> = Vec::new();
         let mut rung = if own { Rung::Single } else { Rung::Fixed };
@@ -361,13 +349,13 @@ impl<'a> Problem<'a> {
             let best = &runs[order[0]];
             let (met, apart): (Vec<&Progress>, Vec<&Progress>) =
                 runs.iter().partition(|at| alike(&at.state, &best.state));
-            let rival = apart.iter().any(|at| at.cost < best.cost * (1.0 + config.close));
+            let rival = apart.iter().any(|at| at.cost < best.cost * (1.0 + CLOSE));
             if self.allowed(best) && met.len() > 1 && !rival {
                 break order;
             }
             let Some(shares) = more.next() else { break order };
             rung = Rung::Several;
-            let theta_rad = config.mask.prior.theta_rad;
+            let theta_rad = Prior::default().theta_rad;
             starts.extend(shares.map(|share| PlanarPose { theta_rad: share * theta_rad, ..PlanarPose::default() }));
         };
         let best = runs[order[0]];
@@ -384,8 +372,7 @@ impl<'a> Problem<'a> {
         let points = descents.patches[LAST].iter().map(|(_, patch)| patch.len()).sum();
         let mut answer =
             Answer { starts, runs, winner, rung, fit, lookups: 0, trace: Vec::new(), points, ends: Vec::new() };
-        let stands =
-            if self.predicted { config.predicted_explained } else { config.stands[usize::from(self.free.reaches)] };
+        let stands = if self.predicted { PREDICTED_EXPLAINED } else { STANDS[usize::from(self.free.reaches)] };
         if around && own && explained < stands {
             self.look_around(&mut answer, &mut descents);
         }
@@ -417,7 +404,7 @@ impl<'a> Problem<'a> {
         let mut first = Progress::new(answer.end());
         descents.descend(answer.winner, &mut first, LAST, weight);
         answer.ends = refined.iter().map(|(_, at)| *at).chain([first]).collect();
-        let margin = if self.allowed(&first) { self.config.ahead } else { 0.0 };
+        let margin = if self.allowed(&first) { AHEAD } else { 0.0 };
         if best.cost < first.cost * (1.0 - margin) {
             answer.winner = answer.runs.len();
             answer.rung = Rung::Around;
@@ -440,7 +427,7 @@ impl<'a> Problem<'a> {
     /// Pose to which the mask alone leads from the middle of the prior.
     fn mask_scout(&self, lookups: &mut usize) -> Option<State> {
         let [scouts, _] = self.mask.as_ref()?;
-        let mut search = Search::new(&self.tool.field, self.centroid, self.config.max_iterations, false);
+        let mut search = Search::new(&self.tool.field, self.centroid, STEPS, false);
         let from = [State::from_pose(PlanarPose::default(), self.centroid)];
         let found = search.scout(&from, scouts, &MASK_SCOUTS_M).pop();
         *lookups += search.lookups;
@@ -449,7 +436,7 @@ impl<'a> Problem<'a> {
 
     /// Refines the best two scouts that are apart and cost about the same; which is the best.
     fn refine(&self, runs: &mut [Progress], order: &[usize], descents: &mut Descents<'_, '_>, weight: f64) -> usize {
-        let limit = runs[order[0]].cost * (1.0 + self.config.close);
+        let limit = runs[order[0]].cost * (1.0 + CLOSE);
         let mut refined: Vec<usize> = Vec::with_capacity(2);
         for &run in order {
             let at = runs[run];
@@ -465,20 +452,19 @@ impl<'a> Problem<'a> {
     /// Weight of the mask in the answer.
     fn mask_weight(&self, noise_m: f64, state: State) -> f64 {
         let Some([_, cloud]) = &self.mask else { return 0.0 };
-        let (weight, kernel) = (&self.config.weight, self.config.mask_kernels_m[1]);
+        let kernel = MASK_KERNELS_M[1];
         let cost = self.tool.field.sums(cloud, state, kernel).cost / (kernel * kernel * cloud.len().max(1) as f64);
-        let by_noise = weight.answer * (noise_m / weight.noise_m).powi(4);
-        let least = if self.predicted { weight.predicted } else { weight.range[0] };
-        by_noise.max(least).min(weight.range[1]) * (weight.agrees / cost.max(1e-9)).min(1.0)
+        let by_noise = WEIGHT * (noise_m / NOISE_M).powi(4);
+        let least = if self.predicted { PREDICTED_WEIGHT } else { WEIGHTS[0] };
+        by_noise.max(least).min(WEIGHTS[1]) * (AGREES / cost.max(1e-9)).min(1.0)
     }
 
     pub(super) fn report(&self, points_yz: &[DVec2], answer: Answer) -> AlignReport {
-        let config = self.config;
         let best = answer.runs[answer.winner];
         let pose = best.state.to_pose(self.centroid);
-        let pose = config.mask.prior.slid_in(pose, || self.uncertainty(pose));
+        let pose = Prior::default().slid_in(pose, || self.uncertainty(pose));
         let seen = self.mask.as_ref().map(|[_, cloud]| of_cloud(cloud, self.centroid, &self.tool.field, best.state));
-        let square = config.kernels_m[LAST].powi(2);
+        let square = KERNELS_M[LAST].powi(2);
         let run = |(run, start): (&Progress, &PlanarPose)| Run {
             requested: *start,
             start: *start,
@@ -489,33 +475,21 @@ impl<'a> Problem<'a> {
         };
         let runs: Vec<Run> = answer.runs.iter().zip(&answer.starts).map(run).collect();
         let fits =
-            if config.record { fits(points_yz, &self.tool.field, pose, config.mask_kernels_m[1]) } else { Vec::new() };
+            if self.ask.record { fits(points_yz, &self.tool.field, pose, MASK_KERNELS_M[1]) } else { Vec::new() };
+        let inliers = (best.inliers, best.inlier_squares);
         AlignReport {
             grasp_from_object: pose,
-            converged: best.stop.converged(),
-            stop: best.stop,
-            start: answer.starts[answer.winner],
-            winner: answer.winner,
-            rung: answer.rung,
-            ladder: Vec::new(),
-            certificate: None,
-            iterations: runs.iter().map(|run| run.iterations).sum(),
             lookups: answer.lookups,
             offered: points_yz.len(),
             not_finite: self.not_finite,
-            used: answer.points,
-            inlier_share: best.inliers as f64 / answer.points.max(1) as f64,
-            inlier_rms_m: (best.inlier_squares / (best.inliers as f64).max(1.0)).sqrt(),
-            within_prior: config.allows(pose),
+            within_prior: self.config.allows(pose),
             observability: seen,
             joint: Some(answer.fit),
-            evidence: None,
-            answers: Vec::new(),
             ends: answer.ends.iter().map(|at| (at.state.to_pose(self.centroid), at.cost)).collect(),
-            range: config.range,
+            range: self.config.range,
             trace: answer.trace,
             fits,
-            runs,
+            ..AlignReport::of(runs, answer.winner, answer.rung, answer.points, inliers)
         }
     }
 }

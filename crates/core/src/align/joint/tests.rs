@@ -203,7 +203,7 @@ fn a_grasp_at_70_degrees_is_found_in_a_free_range_and_not_without_one() {
     let found = |range: Range| {
         let contacts = Contacts { points: &points, images: &images };
         let ask = Ask { evidence: true, ..Ask::default() };
-        register_with(&JointConfig { range, ..JointConfig::default() }, contacts, &touch.tool, ask).unwrap()
+        register_with(&JointConfig { range }, contacts, &touch.tool, ask).unwrap()
     };
     let [labs, free] = [Range::default(), Range::FREE].map(found);
     assert!(touch.error_deg(&labs) > 20.0 && labs.answers.is_empty(), "{}", touch.error_deg(&labs));

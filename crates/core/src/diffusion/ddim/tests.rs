@@ -188,27 +188,6 @@ fn wrong_parameters_and_models_are_errors() {
 }
 
 #[test]
-fn the_second_order_follows_the_exact_flow_more_closely() {
-    let (mean, std) = (0.8, 0.3);
-    // The lab's spacing ends at hardly any noise, so that the last step, of first order in both, does not matter.
-    let spacing = Spacing::Lab;
-    let error = |sampler: Sampler, steps: u32| {
-        let mut model = Gaussian { schedule: lab(), mean: vec![mean], std, prediction: Prediction::V };
-        let samples =
-            run(&mut model, &lab(), GenerateConfig { steps, sampler, spacing, ..Default::default() }).unwrap();
-        let a = lab().steps(steps, spacing, Prediction::V).unwrap()[0].alpha_bar;
-        let mut noise = GaussianNoise::new(42);
-        let worst = samples.data().iter().map(|&x| {
-            let z = (noise.draw() - a.sqrt() * mean) / (a * std * std + 1.0 - a).sqrt();
-            (f64::from(x) - (mean + std * z)).abs()
-        });
-        worst.fold(0.0, f64::max)
-    };
-    let errors = [10, 20, 50, 100].map(|steps| [Sampler::Ddim, Sampler::DpmSolver2m].map(|s| error(s, steps)));
-    assert!(errors.iter().all(|[first, second]| second < &(0.6 * first)), "{errors:?}");
-}
-
-#[test]
 fn ancestral_sampling_is_that_of_ddim_and_pure_noise_stays_finite() {
     let ancestral = |sampler, eta| {
         let mut model = Gaussian { schedule: lab(), mean: vec![0.0], std: 1.0, prediction: Prediction::V };
@@ -221,7 +200,7 @@ fn ancestral_sampling_is_that_of_ddim_and_pure_noise_stays_finite() {
     let pure = Schedule::from_alpha_bar(bars).unwrap();
     for steps in [1, 2, 5, 100] {
         let mut model = Gaussian { schedule: pure.clone(), mean: vec![0.4], std: 0.2, prediction: Prediction::V };
-        let config = GenerateConfig { steps, sampler: Sampler::DpmSolver2m, ..Default::default() };
+        let config = GenerateConfig { steps, sampler: Sampler::Ddpm, ..Default::default() };
         assert_eq!(run(&mut model, &pure, config).unwrap().non_finite(), 0, "{steps} steps");
     }
 }
@@ -229,13 +208,13 @@ fn ancestral_sampling_is_that_of_ddim_and_pure_noise_stays_finite() {
 /// Row E22 of the list of numerical failures: every number of steps of the training, each sampler, eta from 0 to 1.
 #[test]
 fn e22_every_number_of_steps_stays_finite_with_every_sampler() {
-    for sampler in [Sampler::Ddim, Sampler::Ddpm, Sampler::DpmSolver2m] {
+    for sampler in [Sampler::Ddim, Sampler::Ddpm] {
         assert_eq!(sampler.key().parse(), Ok(sampler));
     }
     for steps in 1..=1000 {
-        let sampler = [Sampler::Ddim, Sampler::Ddpm, Sampler::DpmSolver2m][steps as usize % 3];
-        let prediction = KINDS[steps as usize / 3 % 3];
-        let spacing = [Spacing::Lab, Spacing::Trailing][steps as usize / 9 % 2];
+        let sampler = [Sampler::Ddim, Sampler::Ddpm][steps as usize % 2];
+        let prediction = KINDS[steps as usize / 2 % 3];
+        let spacing = [Spacing::Lab, Spacing::Trailing][steps as usize / 6 % 2];
         let eta = f64::from(steps % 11) / 10.0;
         let mut model = Perfect { schedule: lab(), clean: vec![0.3, -2.0], prediction, calls: 0 };
         let config = GenerateConfig { steps, eta, sampler, spacing, ..Default::default() };
@@ -254,7 +233,7 @@ fn e22_schedules_at_the_edge_of_the_numbers() {
     let schedules = shares.into_iter().map(|s| Schedule::from_alpha_bar(s).unwrap()).chain([f16_would_lose]);
     for schedule in schedules {
         for prediction in KINDS {
-            for sampler in [Sampler::Ddim, Sampler::Ddpm, Sampler::DpmSolver2m] {
+            for sampler in [Sampler::Ddim, Sampler::Ddpm] {
                 for steps in 1..=schedule.training_steps() as u32 {
                     let mut model = Perfect { schedule: schedule.clone(), clean: vec![0.7; 4], prediction, calls: 0 };
                     let config = GenerateConfig { steps, sampler, ..Default::default() };
@@ -290,7 +269,7 @@ fn estimates_are_what_the_model_sees_and_are_made_only_where_wanted() {
         }
     }
     let clean = vec![-1.5, 0.25, 0.0, 2.0];
-    for sampler in [Sampler::Ddim, Sampler::Ddpm, Sampler::DpmSolver2m] {
+    for sampler in [Sampler::Ddim, Sampler::Ddpm] {
         for prediction in KINDS {
             let mut model = Perfect { schedule: lab(), clean: clean.clone(), prediction, calls: 0 };
             let mut eye = Eye { wanted: 3, seen: Vec::new() };
@@ -302,7 +281,4 @@ fn estimates_are_what_the_model_sees_and_are_made_only_where_wanted() {
             assert!(seen.iter().zip(&clean).all(|(a, b)| (a - b).abs() < 1e-4), "{sampler:?} {prediction:?} {seen:?}");
         }
     }
-    let config = GenerateConfig { guidance: f64::INFINITY, ..Default::default() };
-    let mut model = Perfect { schedule: lab(), clean, prediction: Prediction::V, calls: 0 };
-    assert!(matches!(run(&mut model, &lab(), config), Err(DiffusionError::Choice(_))));
 }

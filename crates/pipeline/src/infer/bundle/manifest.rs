@@ -9,9 +9,9 @@ use serde_json::{Map, Value};
 use super::fit::FitSpec;
 use super::sensor::{SensorPair, SensorSpec};
 use super::{FileEntry, Problems, Role};
-use touch2touch_core::diffusion::{GUIDANCE, GenerateConfig, Prediction, Sampler, Schedule, ScheduleError, Spacing};
+use touch2touch_core::diffusion::{GenerateConfig, Prediction, Sampler, Schedule, Spacing};
 use touch2touch_core::postprocess::{
-    ColorChain, DepthChain, DepthRange, Mapping, PostprocessError, Reduction, Shift, ShiftMode, ShiftStats,
+    ColorChain, DepthChain, DepthRange, PostprocessError, Reduction, Shift, ShiftMode, ShiftStats,
 };
 use touch2touch_core::resample::Resampling;
 use touch2touch_core::rig::{Sensor, SensorKind, lab, share};
@@ -58,30 +58,8 @@ pub struct GeneratorSpec {
     pub defaults: GenerateConfig,
     /// Type of the timestep that the denoiser's graph takes.
     pub timestep: TimestepType,
-    /// Classifier-free guidance; `None` if the model was not trained for it.
-    pub guidance: Option<GuidanceSpec>,
     /// The fit to a rig, if it was fitted to one.
     pub fit: Option<FitSpec>,
-}
-
-/// `guidance`: only for a denoiser that was trained with the condition left out now and then.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct GuidanceSpec {
-    /// Condition without information, which takes the condition's place.
-    pub unconditional: Unconditional,
-    /// The scale to generate with if nobody chooses; 1 is none.
-    pub scale: f64,
-}
-
-/// The condition that says nothing, as in training.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Unconditional {
-    /// A condition of zeros.
-    ZeroCondition,
-    /// Condition that the encoder makes of a GelSlim that feels nothing: a difference of zeros.
-    ZeroDifference,
 }
 
 impl GeneratorSpec {
@@ -98,7 +76,6 @@ impl GeneratorSpec {
     pub fn depth_chain(&self, mode: ShiftMode) -> Result<DepthChain, PostprocessError> {
         let chain = DepthChain {
             range: self.output.range_m.ok_or(PostprocessError::NotDepth)?,
-            mapping: Mapping::Correct,
             reduction: self.output.reduction,
             shift: Shift::None,
             correction: None,
@@ -204,10 +181,10 @@ pub struct ScheduleSpec {
     pub kind: ScheduleKind,
     /// Training steps.
     pub steps: usize,
-    /// First beta; not for the cosine schedule.
-    pub beta_start: Option<f64>,
-    /// Last beta; not for the cosine schedule.
-    pub beta_end: Option<f64>,
+    /// First beta.
+    pub beta_start: f64,
+    /// Last beta.
+    pub beta_end: f64,
 }
 
 /// The formula of a schedule.
@@ -216,25 +193,6 @@ pub struct ScheduleSpec {
 pub enum ScheduleKind {
     /// [`Schedule::scaled_linear`], what latent diffusion calls "linear".
     ScaledLinear,
-    /// [`Schedule::linear`].
-    Linear,
-    /// [`Schedule::cosine`].
-    Cosine,
-}
-
-impl ScheduleSpec {
-    /// The schedule's values.
-    ///
-    /// # Errors
-    /// [`ScheduleError`] for impossible numbers; missing betas count as NaN.
-    pub fn build(&self) -> Result<Schedule, ScheduleError> {
-        let (start, end) = (self.beta_start.unwrap_or(f64::NAN), self.beta_end.unwrap_or(f64::NAN));
-        match self.kind {
-            ScheduleKind::ScaledLinear => Schedule::scaled_linear(self.steps, start, end),
-            ScheduleKind::Linear => Schedule::linear(self.steps, start, end),
-            ScheduleKind::Cosine => Schedule::cosine(self.steps),
-        }
-    }
 }
 
 /// `output` of a generator.
@@ -530,8 +488,6 @@ fn generator(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<B
     let output: Option<OutputSpec> = section(keys, "output", problems);
     let shift: Option<ShiftStats> = if keys.contains_key("shift") { section(keys, "shift", problems) } else { None };
     let defaults: Option<Defaults> = section(keys, "defaults", problems);
-    let guidance: Option<GuidanceSpec> =
-        if keys.contains_key("guidance") { section(keys, "guidance", problems) } else { None };
     let fit: Option<FitSpec> = if keys.contains_key("fit") { section(keys, "fit", problems) } else { None };
 
     let mut check = |fine: bool, what: &str, hint: &str| {
@@ -561,14 +517,9 @@ fn generator(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<B
         let finite = [s.pred_mean, s.pred_std, s.gt_mean, s.gt_std].iter().all(|v| v.is_finite());
         check(finite && s.pred_std >= 0.0 && s.gt_std >= 0.0, "shift: not usable", "give four finite numbers");
     }
-    if let Some(guidance) = &guidance {
-        let (least, most) = (GUIDANCE.start(), GUIDANCE.end());
-        let hint = format!("choose {least} to {most}; 1 is none");
-        check(GUIDANCE.contains(&guidance.scale), "guidance.scale: out of range", &hint);
-    }
     let schedule_spec = schedule.clone();
     let schedule = schedule.and_then(|spec| {
-        let built = spec.build();
+        let built = Schedule::scaled_linear(spec.steps, spec.beta_start, spec.beta_end);
         built.map_err(|err| problems.add(format!("schedule: {err}"), "give the schedule used in training")).ok()
     });
     let defaults = defaults.map(|d| GenerateConfig {
@@ -577,7 +528,6 @@ fn generator(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<B
         seed: d.seed,
         sampler: d.sampler,
         spacing: d.spacing,
-        guidance: guidance.map_or(1.0, |g| g.scale),
     });
     if let Some(d) = &defaults {
         if !(0.0..=1.0).contains(&d.eta) {
@@ -600,7 +550,6 @@ fn generator(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<B
         shift,
         defaults: defaults?,
         timestep: TimestepType::Int64,
-        guidance,
         fit,
     })))
 }

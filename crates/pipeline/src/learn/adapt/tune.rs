@@ -59,7 +59,7 @@ pub(super) fn tune(
     let steps = match tuning {
         Tuning::Steps(steps) => steps,
         Tuning::Within(time) => steps_within(time, STEPPING, count + 1, task, || {
-            Tuner::new(&start, with_simulated(real.clone()), config.clone())
+            Tuner::new(&start, with_simulated(real.clone()), config.clone(), None)
         })?,
     };
     let config = Config { steps: steps as usize, ..config };
@@ -160,10 +160,7 @@ fn predictions(runs: &mut Runs<'_>, run: &Run<'_>, config: &Config) -> Result<Ve
 
 /// Tunes from where the run stands, to its end.
 fn tuner(runs: &mut Runs<'_>, run: &Run<'_>, config: &Config) -> Result<Tuner, TaskError> {
-    let begin = |state: Option<&[u8]>| match state {
-        Some(state) => Tuner::resume(&run.start, run.pairs.clone(), config.clone(), state),
-        None => Tuner::new(&run.start, run.pairs.clone(), config.clone()),
-    };
+    let begin = |state: Option<&[u8]>| Tuner::new(&run.start, run.pairs.clone(), config.clone(), state);
     let times = if run.held.is_empty() { 0 } else { LOOKS };
     runs.finish(
         RunName { file: &run.file, name: &run.name },

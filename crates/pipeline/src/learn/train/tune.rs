@@ -55,21 +55,17 @@ pub(super) fn tune(
         Tuning::Steps(steps) => steps,
         Tuning::Within(time) => {
             let left = time.saturating_sub(begin.elapsed());
-            steps_within(left, STEPPING, 1, task, || MaskTuner::new(&start, touches.clone(), config.clone()))?
+            steps_within(left, STEPPING, 1, task, || MaskTuner::new(&start, touches.clone(), config.clone(), None))?
         }
     };
     let config = MaskConfig { steps: steps as usize, ..config };
-    let judge = Judge { spec: &spec };
     let every = gathered.held.len().div_ceil(LOOKED_AT).max(1);
     let looked_at: Vec<&Drawn> = gathered.held.iter().step_by(every).collect();
     let look = |tuner: &MaskTuner| {
-        let told = judge.told(&looked_at, |imprints| tuner.probabilities(imprints))?;
+        let told = told(&spec, &looked_at, |imprints| tuner.probabilities(imprints))?;
         Ok(MaskScore::mean(told.into_iter()).map_or(0.0, |told| told.dice))
     };
-    let begun = |state: Option<&[u8]>| match state {
-        Some(state) => MaskTuner::resume(&start, touches.clone(), config.clone(), state),
-        None => MaskTuner::new(&start, touches.clone(), config.clone()),
-    };
+    let begun = |state: Option<&[u8]>| MaskTuner::new(&start, touches.clone(), config.clone(), state);
     let times = if looked_at.is_empty() { 0 } else { LOOKS };
     let mut runs = Runs::new(task, steps, 1);
     let run = RunName { file: FILE, name: "the mask model" };
@@ -84,8 +80,8 @@ pub(super) fn tune(
         cx.check(WHAT)?;
         cx.progress(held_out.len() as u64, gathered.held.len() as u64, "scoring masks that were left out");
         let part: Vec<&Drawn> = part.iter().collect();
-        let before = judge.told(&part, |imprints| tuner.probabilities_at_start(imprints))?;
-        let after = judge.told(&part, |imprints| tuner.probabilities(imprints))?;
+        let before = told(&spec, &part, |imprints| tuner.probabilities_at_start(imprints))?;
+        let after = told(&spec, &part, |imprints| tuner.probabilities(imprints))?;
         held_out.extend(part.iter().zip(before.into_iter().zip(after)).map(|(drawn, (before, after))| HeldOut {
             id: drawn.id,
             pair: drawn.pair.clone(),
@@ -192,37 +188,31 @@ fn digest(setup: &TrainSetup, gathered: &Gathered) -> String {
 }
 
 /// Compares what the network says with what was drawn, as the program would use it.
-struct Judge<'a> {
-    spec: &'a MaskSpec,
-}
-
-impl Judge<'_> {
-    fn told(
-        &self,
-        drawn: &[&Drawn],
-        say: impl FnOnce(&[&[f32]]) -> touch2touch_tuning::Result<Vec<Vec<f32>>>,
-    ) -> Result<Vec<MaskScore>, TaskError> {
-        let (input, least) = (&self.spec.input, self.spec.output.threshold as f32);
-        let imprints: Vec<Vec<f32>> = drawn.iter().map(|drawn| drawn.touch(input).imprint_m).collect();
-        let views: Vec<&[f32]> = imprints.iter().map(Vec::as_slice).collect();
-        let said = say(&views).map_err(fail)?;
-        let told = |(drawn, said): (&&Drawn, Vec<f32>)| {
-            let said =
-                Grid::from_vec(input.size[0], input.size[1], said).map_err(|err| TaskError::from_error(WHAT, &err))?;
-            let said = if input.rotation_deg == 180 { said.rotated_180() } else { said };
-            let mut found = Arc::unwrap_or_clone(contact_of(&said, &drawn.imprint, least).mask);
-            let mut truth = drawn.mask.clone();
-            if let Some(counted) = &drawn.counted {
-                for ((found, truth), counted) in
-                    found.as_mut_slice().iter_mut().zip(truth.as_mut_slice()).zip(counted.as_slice())
-                {
-                    (*found, *truth) = (*found && *counted, *truth && *counted);
-                }
+fn told(
+    spec: &MaskSpec,
+    drawn: &[&Drawn],
+    say: impl FnOnce(&[&[f32]]) -> touch2touch_tuning::Result<Vec<Vec<f32>>>,
+) -> Result<Vec<MaskScore>, TaskError> {
+    let (input, least) = (&spec.input, spec.output.threshold as f32);
+    let imprints: Vec<Vec<f32>> = drawn.iter().map(|drawn| drawn.touch(input).imprint_m).collect();
+    let views: Vec<&[f32]> = imprints.iter().map(Vec::as_slice).collect();
+    let said = say(&views).map_err(fail)?;
+    let told = |(drawn, said): (&&Drawn, Vec<f32>)| {
+        let said =
+            Grid::from_vec(input.size[0], input.size[1], said).map_err(|err| TaskError::from_error(WHAT, &err))?;
+        let said = if input.rotation_deg == 180 { said.rotated_180() } else { said };
+        let mut found = Arc::unwrap_or_clone(contact_of(&said, &drawn.imprint, least).mask);
+        let mut truth = drawn.mask.clone();
+        if let Some(counted) = &drawn.counted {
+            for ((found, truth), counted) in
+                found.as_mut_slice().iter_mut().zip(truth.as_mut_slice()).zip(counted.as_slice())
+            {
+                (*found, *truth) = (*found && *counted, *truth && *counted);
             }
-            let agreed = agreement(&found, &truth)
-                .ok_or_else(|| TaskError::new(WHAT, "the mask has another size than its imprint"))?;
-            Ok(MaskScore { iou: agreed.iou, dice: agreed.dice })
-        };
-        drawn.iter().zip(said).map(told).collect()
-    }
+        }
+        let agreed = agreement(&found, &truth)
+            .ok_or_else(|| TaskError::new(WHAT, "the mask has another size than its imprint"))?;
+        Ok(MaskScore { iou: agreed.iou, dice: agreed.dice })
+    };
+    drawn.iter().zip(said).map(told).collect()
 }

@@ -332,14 +332,20 @@ fn ended(pending: Pending, range: f64) -> Result<Entry, (String, String)> {
 
 /// The compared images of a grasp: in meters, or stretched to 0..1 where the scale was lost.
 fn images(case: &LoadedPair, made: &Made, setup: &Setup, upper: bool) -> Vec<Image> {
-    let image = |finger: PadId| {
+    let of_finger = |finger: PadId| {
+        let image = |prediction, truth, noise_free| Image {
+            finger: finger.index(),
+            prediction,
+            truth,
+            noise_free,
+            mask_iou: None,
+            features: Vec::new(),
+        };
         if let Some(color) = made.colors.get(finger) {
             // On the scale on which the peak of the depth stands for that of the color: one pooled figure serves both.
             let levels = |picture: &RgbGrid| planes(picture, PEAK_M / LEVELS);
             let truth = Some(levels(&case.sample.pad(finger)?.color()?.difference));
-            let prediction = levels(color);
-            let finger = finger.index();
-            return Some(Image { finger, prediction, truth, noise_free: None, mask_iou: None, features: Vec::new() });
+            return Some(image(levels(color), truth, None));
         }
         let bubble = case.sample.pad(finger)?.depth()?;
         if case.sample.scale == Scale::Assumed {
@@ -352,23 +358,15 @@ fn images(case: &LoadedPair, made: &Made, setup: &Setup, upper: bool) -> Vec<Ima
                 }
                 (None, None) => return None,
             };
-            let (prediction, truth) = (unit_range(&prediction), unit_range(tile));
-            return Some(Image {
-                finger: finger.index(),
-                prediction,
-                truth: Some(truth),
-                noise_free: None,
-                mask_iou: None,
-                features: Vec::new(),
-            });
+            return Some(image(unit_range(&prediction), Some(unit_range(tile)), None));
         }
         let prediction = made.imprints[finger].clone()?;
         let truth = (!upper).then(|| bubble.imprint.clone());
         let noise_free = bubble.truth.as_ref().map(|t| t.imprint.clone());
-        Some(Image { finger: finger.index(), prediction, truth, noise_free, mask_iou: None, features: Vec::new() })
+        Some(image(prediction, truth, noise_free))
     };
     let meant = |pad: &PadId| setup.finger.is_none_or(|only| only == *pad) && case.sample.pad(*pad).is_some();
-    case.sample.rig.pads().filter(meant).filter_map(image).collect()
+    case.sample.rig.pads().filter(meant).filter_map(of_finger).collect()
 }
 
 /// The work on one pair: a panic in it is that pair's failure and not the end of the run.

@@ -30,8 +30,6 @@ pub struct GeneratorChoice {
     pub sampler: Option<Sampler>,
     /// The training steps visited.
     pub spacing: Option<Spacing>,
-    /// Scale of classifier-free guidance.
-    pub guidance: Option<f64>,
     /// Mapping to meters.
     pub shift: ShiftChoice,
 }
@@ -54,17 +52,13 @@ impl GeneratorChoice {
         let no_generator = || TaskError::new(WHAT, format!("the bundle {} is no generator", bundle.name));
         let info = bundle.generator.as_ref().ok_or_else(no_generator)?;
         let preset = self.preset.config(info.defaults, info.training_steps);
-        let config = GenerateConfig {
+        Ok(GenerateConfig {
             steps: self.steps.unwrap_or(preset.steps),
             seed: self.seed.unwrap_or(preset.seed),
             eta: self.eta.unwrap_or(preset.eta),
             sampler: self.sampler.unwrap_or(preset.sampler),
             spacing: self.spacing.unwrap_or(preset.spacing),
-            guidance: self.guidance.unwrap_or(preset.guidance),
-        };
-        // Said once, before the first pair, rather than for every pair.
-        bundle.check_guidance(config.guidance).map_err(|err| TaskError::from_error(WHAT, &err))?;
-        Ok(config)
+        })
     }
 }
 

@@ -87,8 +87,7 @@ impl Recipe {
                 .option("--seed", config.seed)
                 .option("--sampler", sampler)
                 .option("--spacing", spacing)
-                .option("--eta", config.eta)
-                .option_if("--guidance", Some(config.guidance).filter(|scale| *scale != 1.0));
+                .option("--eta", config.eta);
         }
         if stage >= Stage::Imprint {
             words = words.then(shift_words(self.shift));

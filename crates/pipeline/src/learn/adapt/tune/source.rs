@@ -8,7 +8,7 @@ use touch2touch_tuning::{NoiseSchedule, Pair, Placement, Sampler, Start};
 use super::super::WHAT;
 use super::super::gather::on_grid;
 use crate::error::TaskError;
-use crate::infer::bundle::manifest::ScheduleKind;
+use crate::infer::bundle::manifest::ScheduleSpec;
 use crate::infer::bundle::{Bundle, BundleFile, GeneratorInput, Role};
 use crate::infer::generator::prepare;
 use crate::io::dataset::ASSUMED_IMPRINT_RANGE_M;
@@ -46,18 +46,13 @@ impl Source {
         let read = |file: &BundleFile| {
             file.read(files::MODEL).map(std::borrow::Cow::into_owned).map_err(|err| TaskError::new(WHAT, err))
         };
-        let schedule = &spec.schedule_spec;
-        let (Some(beta_start), Some(beta_end), ScheduleKind::ScaledLinear) =
-            (schedule.beta_start, schedule.beta_end, schedule.kind)
-        else {
-            return Err(TaskError::new(WHAT, "only networks with a scaled linear schedule are tuned"));
-        };
+        let ScheduleSpec { steps, beta_start, beta_end, .. } = spec.schedule_spec;
         let graphs = bundle.files().map(|(role, file)| Ok((role, read(file)?))).collect::<Result<_, TaskError>>()?;
         let range = spec.output.range_m.ok_or_else(|| TaskError::new(WHAT, "it predicts no depth"))?;
         Ok(Self {
             config: *generating.config,
             graphs,
-            schedule: NoiseSchedule { steps: schedule.steps, beta_start, beta_end },
+            schedule: NoiseSchedule { steps, beta_start, beta_end },
             mean: [0, 1, 2].map(|c| spec.input.mean.get(c).map_or(0.0, |&v| v as f32)),
             std: [0, 1, 2].map(|c| spec.input.std.get(c).map_or(1.0, |&v| v as f32)),
             input: GeneratorInput {
@@ -97,7 +92,7 @@ impl Source {
         let mean = finite().sum::<f64>() / finite().count().max(1) as f64;
         let unit = |&v: &f32| ((if v.is_finite() { f64::from(v) } else { mean } - lo) / (hi - lo)) as f32;
         let imprint = target.as_slice().iter().map(unit).collect();
-        Ok(Pair { picture: prepared.into_data(), imprint, frame, weight: 1.0 })
+        Ok(Pair { picture: prepared.into_data(), imprint, frame })
     }
 
     /// Touches of the simulator, which lie where the model expects them; none for other rigs than the simulator's.
