@@ -182,7 +182,7 @@ fn parse(arguments: impl IntoIterator<Item = OsString>) -> anyhow::Result<Option
     // Before the parser, which takes any word for a path and complains about what follows it.
     if let Some(first) = arguments.get(1)
         && !first.to_string_lossy().starts_with('-')
-        && !is_verb(first)
+        && !verbs().iter().any(|verb| first == verb.as_str())
     {
         check_studio_path(Path::new(first))?;
     }
@@ -201,10 +201,6 @@ fn parse(arguments: impl IntoIterator<Item = OsString>) -> anyhow::Result<Option
 
 fn verbs() -> Vec<String> {
     Cli::command().get_subcommands().map(|verb| verb.get_name().to_owned()).chain(["help".to_owned()]).collect()
-}
-
-fn is_verb(word: &std::ffi::OsStr) -> bool {
-    verbs().iter().any(|verb| word == verb.as_str())
 }
 
 /// Refuses what is neither a folder nor a file nor the name of a built-in data set, before a window opens: most likely it

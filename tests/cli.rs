@@ -117,7 +117,7 @@ fn a_simulated_dataset_is_sound_has_poses_and_exports_masks() {
     let counts = json(&exported);
     let total: i64 = ["train", "val", "test"].iter().map(|k| counts[k].as_i64().unwrap()).sum();
     assert_eq!(total, 8, "two fingers of four pairs");
-    assert!(touch2touch_pipeline::io::exchange::check_folder(&masks).problems.is_empty());
+    assert!(touch2touch_pipeline::io::exchange::list(&masks, None).unwrap().refused.is_empty());
 }
 
 #[test]

@@ -59,7 +59,7 @@ impl Source {
         let dataset = match place {
             Place::Demo => Dataset::demo(),
             Place::Path(path) => Dataset::open(path)
-                .map_err(|err| TaskError::from_error(format!("Open {place}"), &err).with_hint(err.hint()))?,
+                .map_err(|err| TaskError::from_error(format!("Open {place}"), &err).with_hint(err.hint))?,
         };
         let mut problems = doubts::notes(&dataset);
         problems.extend(dataset.problems.iter().cloned());
@@ -90,7 +90,7 @@ impl Source {
     pub fn load(&self, pair: PairId) -> Result<Sample, TaskError> {
         self.dataset.load(pair).map_err(|err| {
             let name = self.dataset.index.get(pair).map_or("a pair", |entry| &entry.name);
-            TaskError::from_error(format!("Load {name}"), &err).with_hint(err.hint())
+            TaskError::from_error(format!("Load {name}"), &err).with_hint(err.hint)
         })
     }
 

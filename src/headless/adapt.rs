@@ -6,10 +6,9 @@ use std::time::Duration;
 use clap::Args;
 use serde::Serialize;
 
-use super::args::{DatasetArgs, LimitArgs, RegistrationArgs, parse_minutes};
-use super::contact_mask::MaskArgs;
-use super::recipe::ModelArgs;
-use super::{Common, Output, VerbResult};
+use super::VerbResult;
+use super::args::{DatasetArgs, LimitArgs, parse_minutes};
+use super::recipe::RecipeArgs;
 use touch2touch_core::dataset::PairId;
 use touch2touch_pipeline::labels::ImprintSource;
 use touch2touch_pipeline::learn::adapt::{AdaptSetup, Adapted, Scored, Tuning, adapt};
@@ -45,13 +44,7 @@ pub(super) struct AdaptArgs {
     #[command(flatten)]
     limit: LimitArgs,
     #[command(flatten)]
-    mask: MaskArgs,
-    #[command(flatten)]
-    registration: RegistrationArgs,
-    #[command(flatten)]
-    model: ModelArgs,
-    #[command(flatten)]
-    common: Common,
+    recipe: RecipeArgs,
 }
 
 fn parse_parts(text: &str) -> Result<usize, String> {
@@ -75,21 +68,21 @@ pub(super) fn run(args: &AdaptArgs) -> VerbResult {
     } else {
         args.pairs.iter().map(|name| super::find_pair(&dataset, name)).collect::<anyhow::Result<_>>()?
     };
-    let output = Output::new(args.common, "fitting", pairs.len());
-    let models = args.model.models();
-    let recipe = args.model.posed(ImprintSource::Predicted, &dataset.rig, &args.mask, args.registration.one()?)?;
+    let output = args.dataset.output("fitting", pairs.len());
+    let models = args.recipe.model.models();
+    let recipe = args.recipe.of(ImprintSource::Predicted, &dataset.rig)?;
     let setup = AdaptSetup {
         recipe,
         pairs,
         folds: args.validate,
         tuning: args.minutes.map(Tuning::Within).or((args.tune > 0).then_some(Tuning::Steps(args.tune))),
-        unfinished: args.model.unfinished(),
+        unfinished: args.recipe.model.unfinished(),
         out: args.out.clone(),
         force: args.force,
         replace: args.replace,
     };
     let adapted = adapt(&dataset, &setup, &models, &output.job())?;
-    super::notes::say_found(&output, &dataset, &adapted.notes);
+    super::notes::say_found(&dataset, &adapted.notes);
     for remark in &adapted.left_out {
         output.note(&format!("not used: {}: {}", remark.name, remark.why));
     }
@@ -103,8 +96,11 @@ pub(super) fn run(args: &AdaptArgs) -> VerbResult {
         output.note(&format!("against this fit: {objection}"));
     }
     let complete = adapted.left_out.is_empty() && adapted.unwritten.is_none();
-    let report =
-        Report { adapted, from: setup.recipe.generating()?.bundle.name.clone(), engine: args.model.engine_label()? };
+    let report = Report {
+        adapted,
+        from: setup.recipe.generating()?.bundle.name.clone(),
+        engine: args.recipe.model.engine_label()?,
+    };
     output.finish(&report, || text(&report))?;
     Ok(complete)
 }

@@ -1,7 +1,5 @@
 //! Options that several verbs share, read in one way.
 
-use std::convert::Infallible;
-use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Duration;
@@ -10,9 +8,9 @@ use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use strum::IntoEnumIterator;
 
+use super::{Common, Output};
 use touch2touch_core::align::Range;
 use touch2touch_core::pose::Registration;
-use touch2touch_core::rig::{PadId, Rig};
 use touch2touch_pipeline::io::dataset::Dataset;
 use touch2touch_pipeline::pairs;
 
@@ -23,6 +21,8 @@ pub struct DatasetArgs {
     /// grasps of each of 9 seen and 3 unseen tools, simulated), `test-set-ambiguous`, `-mixed`, `-misaligned`, `-noise`.
     #[arg(value_name = "PATH")]
     path: PathBuf,
+    #[command(flatten)]
+    common: Common,
 }
 
 impl DatasetArgs {
@@ -31,9 +31,14 @@ impl DatasetArgs {
         &self.path
     }
 
+    /// The reporter of a verb on it, with a bar of `total` steps.
+    pub fn output(&self, what: &'static str, total: usize) -> Output {
+        Output::new(self.common, what, total)
+    }
+
     /// The folder's data set, or the built-in one of that name; says first what is wrong with it.
     pub fn open(&self) -> anyhow::Result<Dataset> {
-        let dataset = Dataset::open(&self.path).map_err(|err| anyhow::anyhow!("{err}; {}", err.hint()))?;
+        let dataset = Dataset::open(&self.path).map_err(|err| anyhow::anyhow!("{err}; {}", err.hint))?;
         super::notes::say_problems(&dataset);
         Ok(dataset)
     }
@@ -49,24 +54,18 @@ where
 }
 
 /// Reads a value by its own words, and lists those that it begins with in the help.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Listed<T> {
     words: fn() -> Vec<PossibleValue>,
-    of: PhantomData<fn() -> T>,
-}
-
-impl<T> Clone for Listed<T> {
-    fn clone(&self) -> Self {
-        Self { words: self.words, of: PhantomData }
-    }
+    read: fn(&str) -> Result<T, String>,
 }
 
 /// A parser of such a value.
-pub(super) fn listed<T>(words: fn() -> Vec<PossibleValue>) -> Listed<T> {
-    Listed { words, of: PhantomData }
+pub(super) fn listed<T: FromStr<Err = String>>(words: fn() -> Vec<PossibleValue>) -> Listed<T> {
+    Listed { words, read: str::parse }
 }
 
-impl<T: FromStr<Err = String> + Clone + Send + Sync + 'static> TypedValueParser for Listed<T> {
+impl<T: Clone + Send + Sync + 'static> TypedValueParser for Listed<T> {
     type Value = T;
 
     fn parse_ref(
@@ -75,8 +74,7 @@ impl<T: FromStr<Err = String> + Clone + Send + Sync + 'static> TypedValueParser 
         arg: Option<&clap::Arg>,
         value: &std::ffi::OsStr,
     ) -> Result<T, clap::Error> {
-        let read: fn(&str) -> Result<T, String> = str::parse;
-        read.parse_ref(cmd, arg, value)
+        self.read.parse_ref(cmd, arg, value)
     }
 
     fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
@@ -174,33 +172,6 @@ pub fn at_least_one<T: FromStr + PartialOrd + From<u8>>(text: &str) -> Result<T,
         Ok(number) if number >= T::from(1) => Ok(number),
         Ok(_) => Err("that leaves nothing to do; give 1 or more, or leave the option out".to_owned()),
         Err(_) => Err("a whole number of 1 or more is needed".to_owned()),
-    }
-}
-
-/// Finger whose image is meant: the name of one, or `both`, which means all.
-#[derive(Debug, Clone)]
-pub(super) struct FingerArg(String);
-
-impl FromStr for FingerArg {
-    type Err = Infallible;
-
-    fn from_str(name: &str) -> Result<Self, Infallible> {
-        Ok(Self(name.to_lowercase()))
-    }
-}
-
-impl FingerArg {
-    /// The fingers it stands for. A rig with a single one has no other, however it is called.
-    pub(super) fn fingers(&self, rig: &Rig) -> anyhow::Result<Vec<PadId>> {
-        let all = rig.pad_list();
-        if self.0 == "both" || all.len() == 1 {
-            return Ok(all);
-        }
-        let finger = rig.pad_of_key(&self.0).ok_or_else(|| {
-            let names: Vec<_> = all.iter().map(|pad| rig.pad_key(*pad)).collect();
-            anyhow::anyhow!("there is no finger \"{}\"; name one of {} or both", self.0, names.join(", "))
-        })?;
-        Ok(vec![finger])
     }
 }
 

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde::Serialize;
 
-use super::args::{DatasetArgs, RegistrationArgs};
-use super::contact_mask::{MaskArgs, labels_of};
+use super::VerbResult;
+use super::args::DatasetArgs;
+use super::contact_mask::labels_of;
 use super::notes::Notes;
-use super::recipe::ModelArgs;
-use super::{Common, Output, VerbResult};
+use super::recipe::{ModelArgs, RecipeArgs};
 use touch2touch_core::colormap::{ColorMap, Range};
 use touch2touch_core::findings::Finding;
 use touch2touch_core::grid::DepthMap;
@@ -53,13 +53,7 @@ pub(super) struct CompareArgs {
     #[arg(long)]
     out: Option<PathBuf>,
     #[command(flatten)]
-    mask: MaskArgs,
-    #[command(flatten)]
-    registration: RegistrationArgs,
-    #[command(flatten)]
-    model: ModelArgs,
-    #[command(flatten)]
-    common: Common,
+    recipe: RecipeArgs,
 }
 
 /// Figures of one imprint against another.
@@ -127,7 +121,7 @@ pub(super) fn run(args: &CompareArgs) -> VerbResult {
     let dataset = args.dataset.open()?;
     let id = super::find_pair(&dataset, &args.pair)?;
     let entry = &dataset.index.pairs[id.0 as usize];
-    let output = Output::new(args.common, "comparing", 1);
+    let output = args.dataset.output("comparing", 1);
     let sample = dataset.load(id)?;
     let mut notes = Notes::of(&dataset);
     notes.take(&output, &sample.notes);
@@ -140,11 +134,13 @@ pub(super) fn run(args: &CompareArgs) -> VerbResult {
     let labels = labels_of(&Labels::of(&dataset), &entry.name, &output);
     let tool = tool.as_ref().map(|loaded| &loaded.model);
     let touch = Touch { dataset: &dataset, pair: id, sample: &sample, tool: tool.ok_or(&lacks), labels: &labels };
-    let models = args.model.models();
-    let recipe = |model: &ModelArgs, imprint| model.posed(imprint, &dataset.rig, &args.mask, args.registration.one()?);
-    let measuring = recipe(&args.model, ImprintSource::Measured)?;
+    let models = args.recipe.model.models();
+    let recipe = |model: &ModelArgs, imprint| {
+        model.posed(imprint, &dataset.rig, &args.recipe.mask, args.recipe.registration.one()?)
+    };
+    let measuring = recipe(&args.recipe.model, ImprintSource::Measured)?;
     let find = |subject: &Subject| -> anyhow::Result<SubjectImprints> {
-        let from = made_from(subject, &args.model, |model| recipe(model, ImprintSource::Predicted))?;
+        let from = made_from(subject, &args.recipe.model, |model| recipe(model, ImprintSource::Predicted))?;
         Ok(depict(&from, &measuring, touch, &models, &JobCx::unwatched())?)
     };
     let (found, measured) = ([find(&args.a)?, find(&args.b)?], find(&Subject::Measured)?);

@@ -18,7 +18,7 @@ pub(super) struct MaskArgs {
     /// imprint that is clearly not flat, depth decides. A number of the source's own follows a colon: `threshold:mm=4`,
     /// `unet:probability=0.4`, `cad:mm=1` (largest distance to the CAD model), `top_percent:percent=10`.
     #[arg(long, value_name = "SOURCE", default_value = MaskSource::default().key(), value_parser = sources())]
-    mask: MaskChoice,
+    pub mask: MaskChoice,
     /// Leave out the masks that were drawn by hand.
     #[arg(long)]
     pub no_hand: bool,
@@ -26,13 +26,6 @@ pub(super) struct MaskArgs {
 
 fn sources() -> Listed<MaskChoice> {
     listed(|| MaskSource::iter().map(|source| PossibleValue::new(source.key()).help(source.tooltip())).collect())
-}
-
-impl MaskArgs {
-    /// The choice.
-    pub(super) fn choice(&self) -> MaskChoice {
-        self.mask
-    }
 }
 
 /// The labels of a pair, made in the studio or by `label`; damaged ones are said and do not hold up the rest.

@@ -9,20 +9,19 @@ use std::path::PathBuf;
 use clap::Args;
 use serde::Serialize;
 
+use super::VerbResult;
 use super::args::DatasetArgs;
 use super::recipe::kept;
-use super::{Common, Output, VerbResult};
 use touch2touch_core::findings::Finding;
 use touch2touch_core::units::counted;
 use touch2touch_pipeline::doctor::{self, Cure, Examined, Fact, Worth};
 use touch2touch_pipeline::export::DrawnMasks;
-use touch2touch_pipeline::infer::engine::EngineChoice;
-use touch2touch_pipeline::io::dataset::{Dataset, OpenError};
+use touch2touch_pipeline::io::dataset::Dataset;
 use touch2touch_pipeline::io::doctor::{DoctorReport, MOST_PAIRS};
+use touch2touch_pipeline::io::error::FileErrorKind;
 use touch2touch_pipeline::labels::{ImprintSource, Labels};
 use touch2touch_pipeline::steps::bundles::{self, BundleKind};
 use touch2touch_pipeline::steps::models::Models;
-use touch2touch_pipeline::steps::predict::Generating;
 use touch2touch_pipeline::steps::recipe::Recipe;
 
 /// Arguments of `doctor`. Findings that differ only in file, finger or numbers are one entry, in the text and in the JSON
@@ -46,8 +45,6 @@ pub(super) struct DoctorArgs {
     /// units it says `auto`). What the file said before is replaced.
     #[arg(long, value_name = "NAME=VALUE", num_args = 1..)]
     set: Vec<set::Setting>,
-    #[command(flatten)]
-    common: Common,
 }
 
 /// `problems` has an entry for each kind of problem: `file`, `what` and `hint` are of the first of its kind; `count` says
@@ -69,24 +66,29 @@ struct Report<'a> {
 /// Done means examined: problems found are the result, not a failure.
 pub(super) fn run(args: &DoctorArgs) -> VerbResult {
     if !args.set.is_empty() {
-        return set::run(&args.dataset, &args.set, args.common);
+        return set::run(&args.dataset, &args.set);
     }
-    let output = Output::new(args.common, "examining", 0);
+    let output = args.dataset.output("examining", 0);
     let (mut about, mut worth) = (Vec::new(), None);
     let models = Models::new(kept());
     // Without knowing the sensors, none of its pairs can be examined.
     let (title, report, read_as, opened) = match Dataset::open(args.dataset.path()) {
         Ok(dataset) => {
             about = doctor::facts(&dataset, &DrawnMasks { labels: &Labels::of(&dataset), changed: &BTreeMap::new() });
-            worth = tried_models(args, &dataset, &models, &output)?;
+            let recipe = if args.no_predictions { Recipe::default() } else { shipped(args, &dataset) };
+            if !args.no_predictions {
+                worth = doctor::worth(&dataset, &recipe, &models, &output.job())?;
+            }
             about.extend(worth.iter().flat_map(Worth::facts));
-            let Examined { report, read_as } = examined(args, &dataset, &models, &output)?;
+            let most = if args.all { usize::MAX } else { MOST_PAIRS };
+            let generator = recipe.generating().ok().map(|generating| (&models, generating));
+            let Examined { report, read_as } = doctor::examined(&dataset, most, generator, &output.job())?;
             (dataset.title, report, read_as, true)
         }
-        Err(err @ OpenError::Rig { .. }) => {
+        Err(err) if err.kind == FileErrorKind::Rig => {
             (args.dataset.path().display().to_string(), DoctorReport::refused(&err), None, false)
         }
-        Err(err) => anyhow::bail!("{err}; {}", err.hint()),
+        Err(err) => anyhow::bail!("{err}; {}", err.hint),
     };
     let DoctorReport { pairs, examined, ref problems } = report;
     let said = Report { about: &about, worth: worth.as_ref(), pairs, examined, problems, read_as };
@@ -126,42 +128,15 @@ fn line(fact: &Fact) -> String {
     text
 }
 
-/// The worth of the shipped models, or of the generator that is named; none where none is to be tried.
-fn tried_models(
-    args: &DoctorArgs,
-    dataset: &Dataset,
-    models: &Models,
-    output: &Output,
-) -> anyhow::Result<Option<Worth>> {
-    if args.no_predictions {
-        return Ok(None);
-    }
+/// The shipped models, or the generator that is named, with its own settings.
+fn shipped(args: &DoctorArgs, dataset: &Dataset) -> Recipe {
     let found = bundles::find(&[]);
     let take = |kind, named| found.take(kind, named, &dataset.rig).ok();
     let generator = take(BundleKind::Generator, args.bundle.as_deref())
         .and_then(|bundle| Some((bundle.generator.as_ref()?.defaults, bundle)))
         .map(|(defaults, bundle)| (bundle.into(), defaults));
-    let recipe = Recipe {
-        imprint: ImprintSource::Predicted,
-        generator,
-        mask_model: take(BundleKind::Mask, None).map(Into::into),
-        ..Recipe::default()
-    };
-    Ok(doctor::worth(dataset, &recipe, models, &output.job())?)
-}
-
-/// The pairs examined; predictions are compared where a generator for these sensors is there.
-fn examined(args: &DoctorArgs, dataset: &Dataset, models: &Models, output: &Output) -> anyhow::Result<Examined> {
-    let cx = output.job();
-    let most = if args.all { usize::MAX } else { MOST_PAIRS };
-    let bundle = (!args.no_predictions)
-        .then(|| bundles::find(&[]).take(BundleKind::Generator, args.bundle.as_deref(), &dataset.rig).ok())
-        .flatten();
-    let Some((bundle, info)) = bundle.as_ref().and_then(|bundle| Some((bundle, bundle.generator.as_ref()?))) else {
-        return Ok(doctor::examined(dataset, most, None, &cx)?);
-    };
-    let generating = Generating { bundle, engine: EngineChoice::Auto, config: &info.defaults };
-    Ok(doctor::examined(dataset, most, Some((models, generating)), &cx)?)
+    let mask_model = take(BundleKind::Mask, None).map(Into::into);
+    Recipe { imprint: ImprintSource::Predicted, generator, mask_model, ..Recipe::default() }
 }
 
 /// The other examples, by the names of their files.

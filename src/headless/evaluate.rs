@@ -1,20 +1,23 @@
 //! `touch2touch evaluate`: the paper's results table of a data set.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use touch2touch_pipeline::io::dataset::Dataset;
 
 use clap::Args;
 
-use super::args::{DatasetArgs, FingerArg, RegistrationArgs, at_least_one, keyed};
+use super::VerbResult;
+use super::args::{DatasetArgs, RegistrationArgs, at_least_one, keyed};
 use super::contact_mask::MaskArgs;
-use super::recipe::{MappingArgs, RuntimeArg, common, first_mask_model};
-use super::{Common, Output, VerbResult};
+use super::recipe::{MappingArgs, RuntimeArg, first_mask_model};
 use touch2touch_core::diffusion::Sampler;
 use touch2touch_core::evaluation::{self, Row, paper_rows};
 use touch2touch_pipeline::infer::bundle::{Bundle, Found, Origin, find_all};
 use touch2touch_pipeline::io::atomic;
+use touch2touch_pipeline::io::error::FileError;
+use touch2touch_pipeline::pairs::pads_named;
 use touch2touch_pipeline::scores::evaluate::{Evaluation, Report, Setup, csv, evaluate, export, rows};
 use touch2touch_pipeline::steps::models::Models;
+use touch2touch_pipeline::steps::recipe::Recipe;
 
 /// Arguments of `evaluate`.
 #[derive(Debug, Args)]
@@ -36,7 +39,7 @@ pub(super) struct EvaluateArgs {
     registration: RegistrationArgs,
     /// Finger whose images are scored: right, left (or as the data set names it), both. Angles always use both fingers.
     #[arg(long, value_name = "FINGER", default_value = "both")]
-    fingers: FingerArg,
+    fingers: String,
     /// Predict everything anew and keep nothing: ignores earlier predictions, also those of the studio.
     #[arg(long)]
     no_cache: bool,
@@ -74,8 +77,6 @@ pub(super) struct EvaluateArgs {
     /// Add the scores of every grasp to the JSON.
     #[arg(long)]
     pairs: bool,
-    #[command(flatten)]
-    common: Common,
 }
 
 fn batch(text: &str) -> Result<usize, String> {
@@ -85,10 +86,10 @@ fn batch(text: &str) -> Result<usize, String> {
 pub(super) fn run(args: &EvaluateArgs) -> VerbResult {
     let dataset = args.dataset.open()?;
     let setup = setup(args, &dataset)?;
-    let output = Output::new(args.common, "evaluating", 0);
+    let output = args.dataset.output("evaluating", 0);
     let models = Models::new(if args.no_cache { None } else { super::recipe::kept() });
     let evaluation = evaluate(&dataset, &setup, &models, &output.job())?;
-    super::notes::say_found(&output, &dataset, &evaluation.findings);
+    super::notes::say_found(&dataset, &evaluation.findings);
     for skipped in &evaluation.skipped {
         let by = if skipped.method.is_empty() { String::new() } else { format!(" ({})", skipped.method) };
         output.note(&format!("{}{by}: {}", skipped.what, skipped.why));
@@ -98,18 +99,15 @@ pub(super) fn run(args: &EvaluateArgs) -> VerbResult {
         export(&evaluation, args.paper, folder)?;
     }
     if let Some(file) = &args.csv {
-        write(file, &csv(&evaluation, args.paper))?;
+        let table = csv(&evaluation, args.paper);
+        atomic::write_bytes(file, table.as_bytes())
+            .map_err(|err| FileError::io(file, "cannot write the table", err))?;
     }
     let pairs = args.pairs.then_some(evaluation.scores.as_slice());
     let published = if args.paper { paper_rows() } else { Vec::new() };
     let report = Report { evaluation: &evaluation, published, pairs };
     output.finish(&report, || text(&evaluation, &rows))?;
     Ok(evaluation.complete && evaluation.skipped.is_empty())
-}
-
-fn write(file: &Path, text: &str) -> anyhow::Result<()> {
-    atomic::write_bytes(file, text.as_bytes())
-        .map_err(|err| anyhow::anyhow!("cannot write the table: {err}: {}", file.display()))
 }
 
 fn text(evaluation: &Evaluation, rows: &[Row]) -> String {
@@ -149,15 +147,18 @@ fn setup(args: &EvaluateArgs, dataset: &Dataset) -> anyhow::Result<Setup> {
             refused.concat()
         );
     }
-    let fingers = args.fingers.fingers(&dataset.rig)?;
+    let fingers = pads_named(&dataset.rig, &args.fingers).map_err(anyhow::Error::msg)?;
     let finger = fingers.first().copied().filter(|_| fingers.len() < dataset.rig.pads().len());
     let only = if let [one] = generators.as_slice() { Some(Bundle::open(one.clone())?) } else { None };
-    let shift = args.mapping.mode(only.as_ref().map(|bundle| (bundle.name(), bundle.hash())))?;
+    let shift = args.mapping.shift.mode(only.as_ref().map(|bundle| (bundle.name(), bundle.hash())))?;
     let mask_model = first_mask_model(args.mask_bundle.as_deref(), &bundles)?;
+    let (mask, hand) = (args.mask.mask, !args.mask.no_hand);
+    let (registration, engine) = (args.registration.one()?, args.runtime.choice());
+    let recipe = Recipe { shift, mask, mask_model, hand, registration, engine, ..Recipe::default() };
     Ok(Setup {
         bundles: generators,
         classifier: first(&args.classifier, |b| b.tool_classifier().is_some()),
-        recipe: common(shift, &args.mask, mask_model, args.registration.one()?, args.runtime),
+        recipe,
         steps: args.steps,
         seed: args.seed,
         sampler: args.sampler,

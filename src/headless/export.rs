@@ -3,14 +3,13 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use serde::Serialize;
+use serde_json::json;
 
-use super::args::{DatasetArgs, RegistrationArgs, keyed};
-use super::contact_mask::{MaskArgs, labels_of};
+use super::VerbResult;
+use super::args::{DatasetArgs, keyed};
+use super::contact_mask::labels_of;
 use super::notes::Notes;
-use super::recipe::ModelArgs;
-use super::{Common, Output, VerbResult};
-use touch2touch_core::findings::Finding;
+use super::recipe::RecipeArgs;
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::export::pair_files::{PairParts, write};
 use touch2touch_pipeline::job::JobCx;
@@ -35,32 +34,14 @@ pub(super) struct ExportArgs {
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     #[command(flatten)]
-    registration: RegistrationArgs,
-    #[command(flatten)]
-    mask: MaskArgs,
-    #[command(flatten)]
-    model: ModelArgs,
-    #[command(flatten)]
-    common: Common,
-}
-
-#[derive(Serialize)]
-struct Report {
-    pair: String,
-    imprint: &'static str,
-    #[serde(rename = "engine")]
-    registration: String,
-    mask: String,
-    files: Vec<PathBuf>,
-    /// Oddities of the files of the pair.
-    notes: Vec<Finding>,
+    recipe: RecipeArgs,
 }
 
 pub(super) fn run(args: &ExportArgs) -> VerbResult {
     let dataset = args.dataset.open()?;
     let id = super::find_pair(&dataset, &args.pair)?;
     let entry = &dataset.index.pairs[id.0 as usize];
-    let output = Output::new(args.common, "exporting", 1);
+    let output = args.dataset.output("exporting", 1);
     let mut notes = Notes::of(&dataset);
     let sample = dataset.load(id)?;
     notes.take(&output, &sample.notes);
@@ -71,8 +52,8 @@ pub(super) fn run(args: &ExportArgs) -> VerbResult {
         }),
         None => Err(TaskError::new("Export", "there is no CAD model")),
     };
-    let models = args.model.models();
-    let recipe = args.model.posed(args.imprint, &dataset.rig, &args.mask, args.registration.one()?)?;
+    let models = args.recipe.model.models();
+    let recipe = args.recipe.of(args.imprint, &dataset.rig)?;
     let labels = labels_of(&Labels::of(&dataset), &entry.name, &output);
     let touch = Touch { dataset: &dataset, pair: id, sample: &sample, tool: tool.as_ref(), labels: &labels };
     let estimate = estimate(touch, &recipe, Stage::Pose, &models, &JobCx::unwatched())?;
@@ -94,16 +75,12 @@ pub(super) fn run(args: &ExportArgs) -> VerbResult {
         tool: entry.tool.as_deref().zip(tool.as_ref().ok()),
     };
     let files = write(&parts, &args.out)?;
-    let report = Report {
-        pair: entry.name.clone(),
-        imprint: args.imprint.key(),
-        registration: recipe.registration.to_string(),
-        mask,
-        files,
-        notes: notes.into_list(&output),
-    };
+    let report = json!({
+        "pair": entry.name, "imprint": args.imprint, "engine": recipe.registration.to_string(), "mask": mask, "files": files,
+        "notes": notes.into_list(&output),
+    });
     output.finish(&report, || {
-        let lines: Vec<String> = report.files.iter().map(|file| format!("wrote {}", file.display())).collect();
+        let lines: Vec<String> = files.iter().map(|file| format!("wrote {}", file.display())).collect();
         lines.join("\n")
     })?;
     Ok(pose.is_some())

@@ -1,19 +1,18 @@
 //! `touch2touch generate`: predicted imprints of a whole data set, beside the measured ones.
 
 mod report;
-mod write;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::args::{DatasetArgs, FingerArg, PairArgs};
+use super::VerbResult;
+use super::args::{DatasetArgs, PairArgs};
 use super::guard::{Bug, guarded};
 use super::notes::Notes;
 use super::output::says;
 use super::recipe::{ModelArgs, misgiving};
 use super::report::{RunReport, output_stems};
-use super::{Common, Output, VerbResult};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::grid::{DepthMap, RgbGrid};
 use touch2touch_core::postprocess::ShiftMode;
@@ -24,14 +23,15 @@ use touch2touch_pipeline::compare;
 use touch2touch_pipeline::doubts;
 use touch2touch_pipeline::io::dataset::Dataset;
 use touch2touch_pipeline::io::names::with_ending;
+use touch2touch_pipeline::io::{images, npz};
 use touch2touch_pipeline::job::JobCx;
 use touch2touch_pipeline::labels::ImprintSource;
+use touch2touch_pipeline::pairs::pads_named;
 use touch2touch_pipeline::steps::imprint::{self, imprint_of};
 use touch2touch_pipeline::steps::on_pad::OnPad;
 use touch2touch_pipeline::steps::prediction::Prediction;
 
 use report::{COLOR_CONVENTION, Figures, Pair, Report, Stored, Unit, convention, mean, text};
-use write::{write, write_color};
 
 /// Arguments of `generate`.
 #[derive(Debug, Args)]
@@ -43,25 +43,23 @@ pub(super) struct GenerateArgs {
     out: PathBuf,
     /// Finger to predict from: right, left (or as the data set names it), both.
     #[arg(long, default_value = "right")]
-    finger: FingerArg,
+    finger: String,
     #[command(flatten)]
     pairs: PairArgs,
     #[command(flatten)]
     model: ModelArgs,
-    #[command(flatten)]
-    common: Common,
 }
 
 pub(super) fn run(args: &GenerateArgs) -> VerbResult {
     let dataset = args.dataset.open()?;
     let ids = args.pairs.of(&dataset)?;
-    let fingers = args.finger.fingers(&dataset.rig)?;
+    let fingers = pads_named(&dataset.rig, &args.finger).map_err(anyhow::Error::msg)?;
     let models = args.model.models();
     let recipe = args.model.recipe(ImprintSource::Predicted, &dataset.rig)?;
     let (generating, shift) = (recipe.generating()?, recipe.shift);
     let config = *generating.config;
     let stems = output_stems(&args.out, &dataset, &ids)?;
-    let output = Output::new(args.common, "generating", ids.len());
+    let output = args.dataset.output("generating", ids.len());
     let begun = RunReport::begin(&args.out, "generate.json", ids.len())?;
     let mut pairs = Vec::new();
     let mut notes = Notes::of(&dataset);
@@ -172,5 +170,21 @@ fn score(
         (figures.vqvae_psnr_db, figures.vqvae_ssim) = (theirs.psnr_db, theirs.ssim);
         figures.vqvae = theirs.unstretched.map(Stored);
     }
+    Ok(())
+}
+
+/// Writes `STEM.npy` (meters, f32, 140 x 175, raw orientation) and a 16-bit picture of it (0.001 mm steps from
+/// -20 mm) for people.
+fn write(stem: &Path, imprint: &DepthMap) -> anyhow::Result<()> {
+    npz::write_npy(&with_ending(stem, ".npy"), imprint)?;
+    Ok(images::write_depth16(&with_ending(stem, ".png"), imprint)?)
+}
+
+/// Writes `STEM.png`: the difference of a color sensor's images around the middle gray, in its raw orientation;
+/// and `STEM.npy` with the numbers (f32, 3 x height x width).
+fn write_color(stem: &Path, difference: &RgbGrid) -> anyhow::Result<()> {
+    npz::write_npy_planes(&with_ending(stem, ".npy"), difference)?;
+    let picture = difference.map(|pixel| pixel.map(|v| v + 128.0));
+    images::write_rgb8(&with_ending(stem, ".png"), &picture)?;
     Ok(())
 }

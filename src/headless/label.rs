@@ -3,16 +3,18 @@
 mod args;
 mod report;
 
+use serde_json::json;
 use strum::IntoEnumIterator as _;
 
-use super::{Output, VerbResult, find_pair};
+use super::{VerbResult, find_pair};
 use touch2touch_pipeline::io::dataset::Dataset;
 use touch2touch_pipeline::labels::progress::Progress;
 use touch2touch_pipeline::labels::{Labels, Review, take_in};
 use touch2touch_pipeline::masks::label_pair::{Begin, LabelSetup, label_pair};
+use touch2touch_pipeline::pairs::pads_named;
 
 pub(super) use args::LabelArgs;
-use report::{Report, Stored};
+use report::Stored;
 
 pub(super) fn run(args: &LabelArgs) -> VerbResult {
     if args.pose.is_some() && args.accept.is_none() && args.propose.is_none() {
@@ -22,7 +24,7 @@ pub(super) fn run(args: &LabelArgs) -> VerbResult {
     }
     let dataset = args.dataset.open()?;
     let labels = Labels::of(&dataset);
-    let output = Output::new(args.common, "", 0);
+    let output = args.dataset.output("", 0);
     let folder = labels.folder()?.to_owned();
     let (mut pairs, mut complete) = (Vec::new(), true);
     if let Some(kept) = &args.take_in {
@@ -35,7 +37,7 @@ pub(super) fn run(args: &LabelArgs) -> VerbResult {
         let id = find_pair(&dataset, name)?;
         let entry = &dataset.index.pairs[id.0 as usize];
         labels.journal_problem(&entry.name).into_iter().for_each(|err| output.note(&format!("note: {err}")));
-        let stored = label_pair(&dataset, &labels, id, &setup(args, &dataset)?, &args.model.models())?;
+        let stored = label_pair(&dataset, &labels, id, &setup(args, &dataset)?, &args.recipe.model.models())?;
         pairs.push(Stored::new(&entry.name, &stored, &dataset));
     } else {
         for entry in &dataset.index.pairs {
@@ -50,13 +52,12 @@ pub(super) fn run(args: &LabelArgs) -> VerbResult {
         }
     }
     let counts = Progress::of(&dataset.index.pairs, &labels.reviews().states).all;
-    let report = Report { folder, pairs, counts };
-    output.finish(&report, || {
-        let lines: Vec<String> = report.pairs.iter().map(Stored::text).collect();
-        let counted = |review: Review| format!("{} {}", report.counts.of(review), review.name());
-        let counts: Vec<String> = Review::iter().map(counted).collect();
-        let (labeled, folder) = (lines.len(), report.folder.display());
-        format!("{}\n{labeled} labeled pairs in {folder}; of all pairs {}", lines.join("\n"), counts.join(", "))
+    output.finish(&json!({"folder": folder, "pairs": pairs, "counts": counts}), || {
+        let lines: Vec<String> = pairs.iter().map(Stored::text).collect();
+        let counted = |review: Review| format!("{} {}", counts.of(review), review.name());
+        let states: Vec<String> = Review::iter().map(counted).collect();
+        let (labeled, folder) = (lines.len(), folder.display());
+        format!("{}\n{labeled} labeled pairs in {folder}; of all pairs {}", lines.join("\n"), states.join(", "))
     })?;
     Ok(complete)
 }
@@ -71,7 +72,7 @@ fn setup(args: &LabelArgs, dataset: &Dataset) -> anyhow::Result<LabelSetup> {
     };
     let setup = LabelSetup {
         imprint: args.imprint,
-        pads: args.finger.fingers(&dataset.rig)?,
+        pads: pads_named(&dataset.rig, &args.finger).map_err(anyhow::Error::msg)?,
         begin,
         draw: args.draw.clone(),
         clean: args.clean.clone(),
@@ -86,6 +87,6 @@ fn setup(args: &LabelArgs, dataset: &Dataset) -> anyhow::Result<LabelSetup> {
     if !setup.asks_recipe() {
         return Ok(setup);
     }
-    let recipe = args.model.posed(setup.farthest(), &dataset.rig, &args.mask, args.registration.one()?)?;
+    let recipe = args.recipe.of(setup.farthest(), &dataset.rig)?;
     Ok(LabelSetup { recipe, ..setup })
 }

@@ -9,10 +9,10 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 use serde::Serialize;
 
+use super::VerbResult;
 use super::args::{DatasetArgs, LimitArgs, keyed};
 use super::contact_mask::MaskArgs;
 use super::recipe::ModelArgs;
-use super::{Common, Output, VerbResult};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::pose::Registration;
 use touch2touch_pipeline::export::{
@@ -70,8 +70,6 @@ pub(super) struct ExportArgs {
     split_seed: u64,
     #[command(flatten)]
     limit: LimitArgs,
-    #[command(flatten)]
-    common: Common,
 }
 
 #[derive(Serialize)]
@@ -105,7 +103,7 @@ pub(super) fn run(verb: &MasksVerb) -> VerbResult {
     };
     let dataset = args.dataset.open()?;
     let ids = args.limit.spread(dataset.index.pairs.len());
-    let output = Output::new(args.common, "exporting", ids.len());
+    let output = args.dataset.output("exporting", ids.len());
     let setup = ExportSetup {
         pairs: Some(ids.into_iter().map(|id| PairId(id as u32)).collect()),
         choice: ExportChoice {
@@ -147,7 +145,7 @@ pub(super) fn run(verb: &MasksVerb) -> VerbResult {
     };
     output.finish(&exported, || {
         let end = match exported.written {
-            Some(_) => format!("written to {}, read back and found the same by its loader's rules", args.out.display()),
+            Some(_) => format!("written to {}, read back and found the same", args.out.display()),
             None => "nothing was written (--dry-run)".to_owned(),
         };
         [plan.lines(), vec![end]].concat().join("\n")

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
-use serde::Serialize;
+use serde_json::json;
 
 use super::{Common, Output, VerbResult};
 use touch2touch_pipeline::infer::bundle::Bundle;
@@ -36,16 +36,6 @@ pub(super) struct TryArgs {
     path: PathBuf,
 }
 
-#[derive(Serialize)]
-struct BundleReport {
-    bundle: PathBuf,
-    name: Option<String>,
-    hash: Option<String>,
-    /// Engines that took it.
-    engines: Vec<EngineKind>,
-    problems: Vec<String>,
-}
-
 pub(super) fn bundle(verb: &BundleVerb) -> VerbResult {
     match verb {
         BundleVerb::Check(args) => check(args),
@@ -57,37 +47,38 @@ fn check(args: &BundleArgs) -> VerbResult {
     let named = EngineChoice::all().filter(|choice| *choice != EngineChoice::Auto);
     let engines: Vec<EngineKind> = named.filter_map(|choice| resolve(choice).ok()).collect();
     let output = Output::new(args.common, "checking", 1 + engines.len());
-    let mut report =
-        BundleReport { bundle: args.path.clone(), name: None, hash: None, engines: Vec::new(), problems: Vec::new() };
+    let (mut runs_on, mut problems, mut opened) = (Vec::new(), Vec::new(), None);
     match Bundle::open(&args.path) {
         Ok(bundle) => {
             output.step("manifest and files");
             for engine in engines {
                 output.message(engine.label());
                 match sandbox::check(&bundle, engine) {
-                    Ok(()) => report.engines.push(engine),
-                    Err(refusal) => report.problems.push(refusal.to_string()),
+                    Ok(()) => runs_on.push(engine),
+                    Err(refusal) => problems.push(refusal.to_string()),
                 }
                 output.step(engine.label());
             }
-            report.name = Some(bundle.name().to_owned());
-            report.hash = Some(bundle.hash().to_owned());
+            opened = Some(bundle);
         }
         Err(err) => {
-            report.problems =
-                err.problems.iter().map(|p| format!("{}: {} ({})", p.file.display(), p.what, p.hint)).collect();
+            problems = err.problems.iter().map(|p| format!("{}: {} ({})", p.file.display(), p.what, p.hint)).collect();
         }
     }
-    let sound = report.problems.is_empty();
+    let report = json!({
+        "bundle": args.path, "name": opened.as_ref().map(Bundle::name), "hash": opened.as_ref().map(Bundle::hash),
+        "engines": runs_on, "problems": problems,
+    });
+    let sound = problems.is_empty();
     output.finish(&report, || {
         let folder = args.path.display();
-        let labels: Vec<&str> = report.engines.iter().map(|engine| engine.label()).collect();
+        let labels: Vec<&str> = runs_on.iter().map(|engine| engine.label()).collect();
         match (sound, labels.is_empty()) {
             (true, true) => format!("{folder}: valid, but this build has no engine to run it"),
             (true, false) => format!("{folder}: valid; runs on {}", labels.join(" and ")),
-            (false, true) => format!("{folder} is not valid:\n  {}", report.problems.join("\n  ")),
+            (false, true) => format!("{folder} is not valid:\n  {}", problems.join("\n  ")),
             (false, false) => {
-                format!("{folder} runs only on {}:\n  {}", labels.join(" and "), report.problems.join("\n  "))
+                format!("{folder} runs only on {}:\n  {}", labels.join(" and "), problems.join("\n  "))
             }
         }
     })?;

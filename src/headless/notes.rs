@@ -45,22 +45,19 @@ impl Notes {
 
 /// Says what is wrong with a data set as a whole.
 pub(super) fn say_problems(dataset: &Dataset) {
-    for kind in problems(dataset).into_list() {
-        output::note(&format!("note: {}: {} ({})", kind.file.display(), kind.what, kind.hint));
-        if kind.count > 1 {
-            output::note(&times(&kind));
-        }
-    }
+    problems(dataset).list().iter().for_each(say);
 }
 
 /// Says what a job found, but for what [`say_problems`] said.
-pub(super) fn say_found(output: &Output, dataset: &Dataset, found: &[Finding]) {
+pub(super) fn say_found(dataset: &Dataset, found: &[Finding]) {
     let said = |odd: &&Finding| !dataset.problems.iter().any(|p| (&p.file, &p.what) == (&odd.file, &odd.what));
-    for odd in found.iter().filter(said) {
-        output.note(&format!("note: {}: {} ({})", odd.file.display(), odd.what, odd.hint));
-        if odd.count > 1 {
-            output.note(&times(odd));
-        }
+    found.iter().filter(said).for_each(say);
+}
+
+fn say(kind: &Finding) {
+    output::note(&format!("note: {}: {} ({})", kind.file.display(), kind.what, kind.hint));
+    if kind.count > 1 {
+        output::note(&times(kind));
     }
 }
 

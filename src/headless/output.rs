@@ -118,8 +118,7 @@ impl Output {
 
     /// Ends the bar and prints the result: the JSON object, or the lines for people.
     pub fn finish(self, value: &impl Serialize, human: impl FnOnce() -> String) -> anyhow::Result<()> {
-        let text = if self.json { serde_json::to_string(value)? } else { human() };
-        Ok(print(text.trim_end())?)
+        self.line(value, || human().trim_end().to_owned())
     }
 }
 
@@ -183,7 +182,7 @@ mod tests {
     #[test]
     fn a_cause_is_said_once() {
         let io = || io::Error::from(io::ErrorKind::NotFound);
-        let open = touch2touch_pipeline::io::dataset::OpenError::Io { path: "/x".into(), source: io() };
+        let open = touch2touch_pipeline::io::error::FileError::io("/x", "cannot open", io());
         let text = says(&open.into());
         assert_eq!(text.matches(&io().to_string()).count(), 1, "{text}");
         let chained = anyhow::Error::from(io()).context("cannot begin");

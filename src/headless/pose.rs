@@ -5,12 +5,12 @@ mod report;
 
 use std::collections::BTreeMap;
 
+use super::VerbResult;
 use super::contact_mask::labels_of;
 use super::guard::{Bug, guarded};
 use super::notes::Notes;
 use super::output::says;
 use super::recipe::misgiving;
-use super::{Output, VerbResult};
 use touch2touch_core::align::{AlignReport, Ask};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::manual::AcceptedPose;
@@ -27,7 +27,6 @@ use touch2touch_pipeline::steps::pose::PoseResult;
 use touch2touch_pipeline::steps::recipe::{Recipe, Stage};
 use touch2touch_pipeline::steps::tool::load_tool;
 
-use args::Imprints;
 pub(super) use args::{PoseArgs, parse_start};
 use report::{Accepted, AnswerRow, First, PoseRow, RankedTool, Report, summary, text};
 
@@ -37,13 +36,9 @@ const ANY: &str = "any";
 pub(super) fn run(args: &PoseArgs) -> VerbResult {
     let dataset = args.dataset.open()?;
     let ids = args.pairs.of(&dataset)?;
-    let imprints: &[ImprintSource] = match args.imprint {
-        Imprints::Measured => &[ImprintSource::Measured],
-        Imprints::Predicted => &[ImprintSource::Predicted],
-        Imprints::Both => &[ImprintSource::Measured, ImprintSource::Predicted],
-    };
-    let output = Output::new(args.common, "aligning", ids.len());
-    let models = args.model.models();
+    let imprints = args.imprint.sides();
+    let output = args.dataset.output("aligning", ids.len());
+    let models = args.recipe.model.models();
     let recipe = args.recipe(&dataset.rig)?;
     let mut tools: BTreeMap<String, Option<ToolModel>> = BTreeMap::new();
     let mut notes = Notes::of(&dataset);
@@ -129,7 +124,8 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
     }
     complete &= !cases.is_empty();
     let notes = notes.into_list(&output);
-    let of = First { registration: args.registration.all()?[0].to_string(), imprint: imprints[0].key().to_owned() };
+    let of =
+        First { registration: args.recipe.registration.all()?[0].to_string(), imprint: imprints[0].key().to_owned() };
     let report = Report { summary: summary(&cases, of), cases, notes };
     output.finish(&report, || text(&report))?;
     Ok(complete)
@@ -190,5 +186,5 @@ fn pose_cases(args: &PoseArgs, asked: &PairInput<'_>, models: &Models) -> anyhow
             report: found.ok().filter(|_| args.trace).map(|found| AlignReport { evidence: None, ..found.report }),
         })
     };
-    args.registration.all()?.iter().map(one).collect()
+    args.recipe.registration.all()?.iter().map(one).collect()
 }

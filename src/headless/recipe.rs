@@ -8,7 +8,6 @@ use super::contact_mask::MaskArgs;
 use crate::app::services::Services;
 use touch2touch_core::dataset::Problem;
 use touch2touch_core::pose::Registration;
-use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_core::rig::Rig;
 use touch2touch_core::sample::Sample;
 use touch2touch_pipeline::error::TaskError;
@@ -23,8 +22,15 @@ use touch2touch_pipeline::steps::mask::MaskSource;
 use touch2touch_pipeline::steps::models::Models;
 use touch2touch_pipeline::steps::recipe::{GeneratorChoice, Model, Recipe};
 
-pub(super) use args::MappingArgs;
+pub(super) use args::{MappingArgs, RecipeArgs};
 pub use args::{ModelArgs, RuntimeArg};
+
+impl RecipeArgs {
+    /// The recipe of a pose of these imprints, for the sensors of `rig`.
+    pub(super) fn of(&self, imprint: ImprintSource, rig: &Rig) -> anyhow::Result<Recipe> {
+        self.model.posed(imprint, rig, &self.mask, self.registration.one()?)
+    }
+}
 
 impl ModelArgs {
     /// The models of one run of the program; none is loaded yet.
@@ -56,7 +62,7 @@ impl ModelArgs {
         let recipe = Recipe { imprint, engine: self.engine(), ..Recipe::default() };
         if imprint == ImprintSource::Measured {
             // Without a generator nothing is read by it; what was asked for is still said.
-            return Ok(Recipe { shift: self.mapping.mode(None).unwrap_or_default(), ..recipe });
+            return Ok(Recipe { shift: self.mapping.shift.mode(None).unwrap_or_default(), ..recipe });
         }
         let (generator, shift) = self.generator_choice().of(self.found(), rig)?;
         Ok(Recipe { generator: Some(generator), shift, ..recipe })
@@ -84,10 +90,9 @@ impl ModelArgs {
         mask: &MaskArgs,
         registration: Registration,
     ) -> anyhow::Result<Recipe> {
-        let choice = mask.choice();
-        let mask_model = self.mask_model(choice.source, rig)?;
+        let mask_model = self.mask_model(mask.mask.source, rig)?;
         let recipe = self.recipe(imprint, rig)?;
-        Ok(Recipe { mask: choice, mask_model, hand: !mask.no_hand, registration, ..recipe })
+        Ok(Recipe { mask: mask.mask, mask_model, hand: !mask.no_hand, registration, ..recipe })
     }
 
     /// The mask model that masks of this source take.
@@ -100,18 +105,6 @@ impl ModelArgs {
 pub(super) fn kept() -> Option<Store> {
     let (settings, _) = Services::of_user().load_settings();
     Some(Store::new(user_folder()?, u64::from(settings.cache_mib) << 20))
-}
-
-/// The recipe that several generators have in common, which are no part of it.
-pub(super) fn common(
-    shift: ShiftMode,
-    mask: &MaskArgs,
-    mask_model: Option<Model>,
-    registration: Registration,
-    engine: RuntimeArg,
-) -> Recipe {
-    let (mask, hand) = (mask.choice(), !mask.no_hand);
-    Recipe { shift, mask, mask_model, hand, registration, engine: engine.choice(), ..Recipe::default() }
 }
 
 /// The mask model that is named, else the first that was found.

@@ -13,14 +13,8 @@ use touch2touch_pipeline::io::names::Outputs;
 /// Paths of the pairs' files, without an ending, each pair's its own; the folder is made if it is not there. A run that
 /// would write two pairs to one file ends here, before it wrote anything.
 pub(super) fn output_stems(folder: &Path, dataset: &Dataset, ids: &[usize]) -> anyhow::Result<Vec<PathBuf>> {
-    let mut outputs = outputs(folder)?;
+    let mut outputs = Outputs::new(folder)?;
     Ok(ids.iter().map(|id| outputs.stem(&dataset.index.pairs[*id].name)).collect::<Result<_, _>>()?)
-}
-
-/// The names of outputs in a folder that is made if it is not there.
-pub(super) fn outputs(folder: &Path) -> anyhow::Result<Outputs> {
-    Outputs::new(folder)
-        .map_err(|err| anyhow::anyhow!("cannot write to the output folder: {err}: {}", folder.display()))
 }
 
 /// A report that was begun. Without [`RunReport::finish`] it stays one of an unfinished run.
@@ -53,8 +47,6 @@ impl RunReport {
     }
 
     fn write(&self, value: &impl Serialize) -> anyhow::Result<()> {
-        let text = serde_json::to_vec_pretty(value)?;
-        atomic::write_bytes(&self.file, &text)
-            .map_err(|err| anyhow::anyhow!("cannot write the report: {err}: {}", self.file.display()))
+        Ok(atomic::write_json(&self.file, "cannot write the report", value)?)
     }
 }

@@ -5,7 +5,6 @@ use std::path::PathBuf;
 
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use serde::Serialize;
 use serde_json::json;
 use strum::IntoEnumIterator;
 
@@ -60,18 +59,6 @@ pub(super) struct SimulateArgs {
 pub fn condition() -> impl TypedValueParser<Value = Condition> {
     PossibleValuesParser::new(Condition::iter().map(|c| PossibleValue::new(c.key()).help(c.description())))
         .map(|key| key.parse().unwrap_or_default())
-}
-
-#[derive(Serialize)]
-struct Written {
-    out: PathBuf,
-    pairs: usize,
-    tools: Vec<String>,
-    condition: Condition,
-    sensors: Sensors,
-    /// `None` for the test set, whose seeds are its own.
-    seed: Option<u64>,
-    seconds: f64,
 }
 
 pub(super) fn run(args: &SimulateArgs) -> VerbResult {
@@ -132,26 +119,14 @@ pub(super) fn run(args: &SimulateArgs) -> VerbResult {
         }
     }
     writing.finish()?;
-    let written = Written {
-        out: args.out.clone(),
-        pairs,
-        tools: models.keys().cloned().collect(),
-        condition: args.condition,
-        sensors,
-        seed: (!args.test_set).then_some(args.seed),
-        seconds: start.elapsed().as_secs_f64(),
-    };
-    output.finish(&written, || {
-        format!("{} pairs of {} tools in {}", written.pairs, written.tools.len(), written.out.display())
-    })?;
-    Ok(true)
-}
+    // The test set's seeds are its own.
+    let written = json!({
+        "out": args.out, "pairs": pairs, "tools": models.keys().collect::<Vec<_>>(), "condition": args.condition,
+        "sensors": sensors, "seed": (!args.test_set).then_some(args.seed), "seconds": start.elapsed().as_secs_f64(),
+    });
+    output.finish(&written, || format!("{pairs} pairs of {} tools in {}", models.len(), args.out.display()))?;
 
-#[derive(Serialize)]
-struct WrittenFaults {
-    out: PathBuf,
-    /// Fault of each tool's touch.
-    faults: BTreeMap<String, &'static str>,
+    Ok(true)
 }
 
 /// One touch per fault, each under a tool of its own that is named after the fault.
@@ -166,12 +141,12 @@ fn write_faults(args: &SimulateArgs) -> VerbResult {
         output.step(name);
     }
     writing.finish()?;
-    let faults = names.iter().map(|(f, name)| (name.clone(), f.what())).collect();
-    let written = WrittenFaults { out: args.out.clone(), faults };
-    output.finish(&written, || {
-        let lines: Vec<String> = written.faults.iter().map(|(name, what)| format!("  {name}: {what}")).collect();
-        format!("{} touches with a fault each in {}\n{}", lines.len(), written.out.display(), lines.join("\n"))
+    let faults: BTreeMap<&String, &str> = names.iter().map(|(f, name)| (name, f.what())).collect();
+    output.finish(&json!({"out": args.out, "faults": faults}), || {
+        let lines: Vec<String> = faults.iter().map(|(name, what)| format!("  {name}: {what}")).collect();
+        format!("{} touches with a fault each in {}\n{}", lines.len(), args.out.display(), lines.join("\n"))
     })?;
+
     Ok(true)
 }
 

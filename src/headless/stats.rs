@@ -6,16 +6,16 @@ use std::sync::Arc;
 use clap::Args;
 use serde::Serialize;
 
-use super::args::{DatasetArgs, FingerArg, at_least_one};
+use super::VerbResult;
+use super::args::{DatasetArgs, at_least_one};
 use super::recipe::ModelArgs;
-use super::{Common, Output, VerbResult};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_core::units::{fixed, mm};
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::io::statistics::ShiftStatistics;
 use touch2touch_pipeline::labels::ImprintSource;
-use touch2touch_pipeline::pairs;
+use touch2touch_pipeline::pairs::{pads_named, spread};
 use touch2touch_pipeline::scores::statistics::{PAIRS, StatisticsSetup, statistics};
 use touch2touch_pipeline::steps::imprint::chain_of;
 
@@ -29,14 +29,12 @@ pub(super) struct StatsArgs {
     out: PathBuf,
     /// Fingers to include: right, left (or as the data set names it), both.
     #[arg(long, default_value = "both")]
-    finger: FingerArg,
+    finger: String,
     /// Take only this many pairs, spread evenly over the data set.
     #[arg(long, value_name = "N", default_value_t = PAIRS, value_parser = at_least_one::<usize>)]
     limit: usize,
     #[command(flatten)]
     model: ModelArgs,
-    #[command(flatten)]
-    common: Common,
 }
 
 #[derive(Debug, Serialize)]
@@ -52,15 +50,14 @@ struct Report {
 
 pub(super) fn run(args: &StatsArgs) -> VerbResult {
     let dataset = args.dataset.open()?;
-    let ids: Vec<PairId> =
-        pairs::spread(dataset.index.pairs.len(), Some(args.limit)).map(|at| PairId(at as u32)).collect();
-    let output = Output::new(args.common, "predicting", ids.len());
+    let ids: Vec<PairId> = spread(dataset.index.pairs.len(), Some(args.limit)).map(|at| PairId(at as u32)).collect();
+    let output = args.dataset.output("predicting", ids.len());
     let models = args.model.models();
     let recipe = args.model.recipe(ImprintSource::Predicted, &dataset.rig)?;
     let generating = recipe.generating()?;
     let chain = chain_of(&models.chains(generating.bundle)?, &generating.bundle.id, ShiftMode::Raw)?;
     let load = |id| dataset.load(id).map(Arc::new).map_err(|err| TaskError::from_error("Load", &err));
-    let fingers = args.finger.fingers(&dataset.rig)?;
+    let fingers = pads_named(&dataset.rig, &args.finger).map_err(anyhow::Error::msg)?;
     let setup = StatisticsSetup { pairs: ids, fingers, recipe: recipe.clone(), dataset: dataset.title.clone() };
     let (statistics, failed) = statistics(&setup, load, &models, &output.job())?;
     for failure in &failed {

@@ -5,14 +5,14 @@ use std::path::PathBuf;
 use clap::Args;
 use serde::Serialize;
 
-use super::args::{DatasetArgs, RegistrationArgs, keyed};
-use super::contact_mask::{MaskArgs, labels_of};
-use super::recipe::ModelArgs;
-use super::{Common, Output, VerbResult};
+use super::VerbResult;
+use super::args::{DatasetArgs, keyed};
+use super::contact_mask::labels_of;
+use super::recipe::RecipeArgs;
 use crate::spatial;
 use touch2touch_core::dataset::PairId;
 use touch2touch_pipeline::error::TaskError;
-use touch2touch_pipeline::labels::{ImprintSource, Labels};
+use touch2touch_pipeline::labels::Labels;
 use touch2touch_pipeline::still::space::{Ground, SpacePane, ViewAngles};
 use touch2touch_pipeline::still::{StillFiles, StillSetup, WIDTH_PX, still};
 
@@ -49,13 +49,7 @@ pub(super) struct StillArgs {
     #[arg(long, value_name = "N")]
     turntable: Option<u32>,
     #[command(flatten)]
-    registration: RegistrationArgs,
-    #[command(flatten)]
-    mask: MaskArgs,
-    #[command(flatten)]
-    model: ModelArgs,
-    #[command(flatten)]
-    common: Common,
+    recipe: RecipeArgs,
 }
 
 /// Reads `YAW,PITCH` in degrees.
@@ -86,15 +80,11 @@ pub(super) fn run(args: &StillArgs) -> VerbResult {
     let dataset = args.dataset.open()?;
     let pair: PairId = super::find_pair(&dataset, &args.pair)?;
     let name = dataset.index.pairs[pair.0 as usize].name.clone();
-    let output = Output::new(args.common, "drawing", args.turntable.unwrap_or(1) as usize);
-    let imprint = match args.imprint {
-        SpacePane::Measured => ImprintSource::Measured,
-        SpacePane::Predicted | SpacePane::Both => ImprintSource::Predicted,
-    };
+    let output = args.dataset.output("drawing", args.turntable.unwrap_or(1) as usize);
     let setup = StillSetup {
         pair,
         pane: args.imprint,
-        recipe: args.model.posed(imprint, &dataset.rig, &args.mask, args.registration.one()?)?,
+        recipe: args.recipe.of(args.imprint.farthest(), &dataset.rig)?,
         labels: labels_of(&Labels::of(&dataset), &name, &output),
         ground: args.ground,
         angles: args.view,
@@ -104,7 +94,7 @@ pub(super) fn run(args: &StillArgs) -> VerbResult {
     };
     setup.check()?;
     let drawer = spatial::stills()?;
-    let models = args.model.models();
+    let models = args.recipe.model.models();
     let report = Report { pair: &name, still: still(&dataset, &setup, &models, drawer, &args.out, &output.job())? };
     output.finish(&report, || {
         let [width, height] = report.still.size_px;

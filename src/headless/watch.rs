@@ -11,13 +11,12 @@ use async_signal::{Signal, Signals};
 use clap::Args;
 use serde_json::json;
 
-use super::args::{DatasetArgs, RegistrationArgs};
-use super::contact_mask::{MaskArgs, readable};
+use super::args::DatasetArgs;
+use super::contact_mask::readable;
 use super::guard::{Bug, guarded};
 use super::output::says;
-use super::recipe::ModelArgs;
-use super::{Common, Output, VerbResult, report};
-use files::Source;
+use super::recipe::RecipeArgs;
+use super::{Output, VerbResult};
 use one::{Arrived, Done, Worker};
 use touch2touch_core::dataset::Problem;
 use touch2touch_pipeline::follow::{FollowEvent, Following, PERIOD, Ready};
@@ -40,32 +39,26 @@ pub(super) struct WatchArgs {
     /// tool there is no pose).
     #[arg(long, value_name = "NAME|FILE.stl")]
     tool: Option<String>,
-    #[command(flatten)]
-    mask: MaskArgs,
-    #[command(flatten)]
-    registration: RegistrationArgs,
     /// Process what is in the folder, skip what was done with the same settings, and exit.
     #[arg(long)]
     once: bool,
     #[command(flatten)]
-    model: ModelArgs,
-    #[command(flatten)]
-    common: Common,
+    recipe: RecipeArgs,
 }
 
 pub(super) fn run(args: &WatchArgs) -> VerbResult {
-    let output = Output::new(args.common, "watching", 0);
+    let output = args.dataset.output("watching", 0);
     let stop = Cancel::default();
     take_signals(stop.clone())?;
-    let masks = args.mask.choice().source;
+    let masks = args.recipe.mask.mask.source;
     if matches!(masks, MaskSource::Cad | MaskSource::Truth) {
         anyhow::bail!("--mask {} needs the true pose, which a new touch does not have", masks.key());
     }
     let folder = args.dataset.path();
-    let outputs = args.out.as_deref().map(report::outputs).transpose()?;
+    let outputs = args.out.as_deref().map(Outputs::new).transpose()?;
     let following = Following::new(folder, args.once)?;
     // The models are chosen for the sensors before the first touch is there.
-    let rig = rig_of(folder).map_err(|err| anyhow::anyhow!("{err}; {}", err.hint()))?;
+    let rig = rig_of(folder).map_err(|err| anyhow::anyhow!("{err}; {}", err.hint))?;
     let worker = Worker::new(args, &rig, stop.clone())?;
     let ready = json!({
         "event": "ready", "folder": folder, "recipe": worker.recipe(None, &PairLabels::default())?,
@@ -75,7 +68,7 @@ pub(super) fn run(args: &WatchArgs) -> VerbResult {
         format!("following {} (models warm after {:.1} s); Ctrl-C ends", folder.display(), worker.warm_s)
     })?;
     following.dataset().into_iter().for_each(|dataset| super::notes::say_problems(dataset));
-    let mut watch = Watch { output, outputs, following, worker, summary: Summary::default() };
+    let mut watch = Watch { output, outputs, following, worker, tool: args.tool.clone(), summary: Summary::default() };
     while let Some(event) = watch.following.wait(&stop, args.once) {
         let output = &watch.output;
         match event {
@@ -117,18 +110,20 @@ fn take_signals(stop: Cancel) -> anyhow::Result<()> {
 }
 
 /// A folder that is watched.
-struct Watch<'a> {
+struct Watch {
     output: Output,
     outputs: Option<Outputs>,
     following: Following,
-    worker: Worker<'a>,
+    worker: Worker,
+    /// The tool of all touches, where one is named.
+    tool: Option<String>,
     summary: Summary,
 }
 
-impl Watch<'_> {
+impl Watch {
     /// Takes one touch as far as it goes now.
     fn touch(&mut self, ready: &Ready) -> anyhow::Result<()> {
-        let Self { output, outputs, following, worker, summary } = self;
+        let Self { output, outputs, following, worker, summary, tool } = self;
         if ready.completed {
             return Ok(());
         }
@@ -141,8 +136,9 @@ impl Watch<'_> {
                 return output.line(&event, || format!("{}: {clash}", ready.name));
             }
         };
-        let source = Source::new(&ready.file, ready.stamp);
-        let tool = worker.tool_name(following.entry(ready).and_then(|entry| entry.tool.clone()));
+        let source = files::source(&ready.file, ready.stamp);
+        // What the command line says, else what the file's name says.
+        let tool = tool.clone().or_else(|| following.entry(ready)?.tool.clone());
         let labels = readable(following.labels(ready), output);
         let recipe = worker.recipe(tool.as_deref(), &labels)?;
         if files::is_done(&stem, &source, &recipe) {
@@ -163,7 +159,8 @@ impl Watch<'_> {
             };
             guarded(vec![ready.file.clone()], work).map_err(|err| {
                 if err.is::<Bug>() {
-                    worker.recover();
+                    // The models are loaded anew for the next touch.
+                    worker.models.forget();
                 }
                 let hint = "touch the file to have it tried again".into();
                 Problem { file: ready.file.clone(), what: says(&err), hint }
@@ -194,10 +191,8 @@ fn report(output: &Output, done: &Done, summary: &mut Summary) -> anyhow::Result
     for note in &done.mask_notes {
         output.note(&format!("note: {}, {note}", done.name));
     }
-    let mut event = json!({"event": "done"});
-    if let (Some(event), serde_json::Value::Object(rest)) = (event.as_object_mut(), serde_json::to_value(done)?) {
-        event.extend(rest);
-    }
+    let mut event = serde_json::to_value(done)?;
+    event["event"] = "done".into();
     output.line(&event, || done.text())
 }
 

@@ -219,7 +219,7 @@ fn place_unit(dir: &Path, bytes: &[u8]) -> PathBuf {
 fn read_unit(dir: &Path, file: &Path) -> Outcome {
     // The refusal is about the model where the unit can be read but makes it impossible.
     read_in_meters(&dir.join("a.stl"), None).map(drop).map_err(|err| {
-        let named = err.file() == file || err.file().ends_with("a.stl");
+        let named = err.file == *file || err.file.ends_with("a.stl");
         assert!(named, "{err}");
         format!("{err} {}", file.display())
     })

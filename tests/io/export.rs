@@ -3,10 +3,9 @@
 use std::path::Path;
 
 use touch2touch_core::grid::{Grid, Mask};
-use touch2touch_core::rig::lab;
-use touch2touch_pipeline::io::exchange::{
-    Content, ExportConfig, ExportEntry, ExportError, MANIFEST, check_folder, export,
-};
+use touch2touch_core::rig::{Rig, lab};
+use touch2touch_pipeline::io::error::FileError;
+use touch2touch_pipeline::io::exchange::{Content, ExportChoice, ExportEntry, MANIFEST, export, list};
 use touch2touch_pipeline::io::images;
 
 fn entries(n: usize) -> Vec<ExportEntry> {
@@ -33,8 +32,8 @@ fn content(i: usize) -> Content {
     Content { mask: imprint.map(|&v| v > 0.005), imprint, ignored: None }
 }
 
-fn run(folder: &Path, n: usize, config: &ExportConfig) -> Result<[usize; 3], ExportError> {
-    export(folder, &entries(n), config, |i| Ok(content(i))).map(|report| report.counts)
+fn run(folder: &Path, n: usize, config: &ExportChoice) -> Result<[usize; 3], FileError> {
+    export(folder, &entries(n), config, &Rig::lab(), |i| Ok(content(i))).map(|report| report.counts)
 }
 
 fn tree(folder: &Path) -> Vec<(String, Vec<u8>)> {
@@ -56,15 +55,18 @@ fn tree(folder: &Path) -> Vec<(String, Vec<u8>)> {
 fn the_folder_is_what_the_loader_accepts() {
     let dir = tempfile::tempdir().unwrap();
     let folder = dir.path().join("new/unet");
-    let config = ExportConfig::default();
-    let report = export(&folder, &entries(20), &config, |i| Ok(content(i))).unwrap();
+    let config = ExportChoice::default();
+    let report = export(&folder, &entries(20), &config, &Rig::lab(), |i| Ok(content(i))).unwrap();
     let counts = report.counts;
     assert!(counts.iter().sum::<usize>() == 20 && counts[0] > 9 && counts[1] > 0 && counts[2] > 0, "{counts:?}");
     assert_eq!((report.out_of_range_px, report.unmeasured_px), (2 * 20, 20));
-    let check = check_folder(&folder);
-    assert_eq!((check.counts, check.problems), (counts, vec![]));
+    let read = list(&folder, None).unwrap();
+    assert!(read.masks.len() == 20 && read.refused.is_empty(), "{:?}", read.refused);
     let first = tree(&folder);
-    assert_eq!(first.len(), 40);
+    // One mask to each image, and no dot or wildcard in a stem, which the loader would trip over.
+    let of = |kind: &str| first.iter().filter(|(n, _)| n.contains(kind)).map(|(n, _)| n.replace(kind, "")).collect();
+    let [images, masks]: [Vec<String>; 2] = ["/imgs/", "/masks/"].map(of);
+    assert!(images == masks && images.len() == 20 && !images.iter().any(|n| n.trim_end_matches(".png").contains('.')));
     let (image, _) =
         first.iter().find(|(name, _)| name.ends_with("data_3_right.png") && name.contains("imgs")).unwrap();
     assert!(image.contains("pattern_31_rod"));
@@ -84,7 +86,7 @@ fn the_folder_is_what_the_loader_accepts() {
 #[test]
 fn foreign_folders_and_failures_leave_everything_as_it_was() {
     let dir = tempfile::tempdir().unwrap();
-    let config = ExportConfig::default();
+    let config = ExportChoice::default();
     let foreign = dir.path().join("foreign");
     std::fs::create_dir_all(foreign.join("train")).unwrap();
     std::fs::write(foreign.join("train/thesis.txt"), b"x").unwrap();
@@ -95,41 +97,20 @@ fn foreign_folders_and_failures_leave_everything_as_it_was() {
     let folder = dir.path().join("unet");
     run(&folder, 5, &config).unwrap();
     let before = tree(&folder);
-    let failing =
-        export(&folder, &entries(5), &config, |i| if i == 3 { Err("no imprint".into()) } else { Ok(content(i)) });
+    let failing = export(&folder, &entries(5), &config, &Rig::lab(), |i| {
+        if i == 3 { Err(anyhow::anyhow!("no imprint")) } else { Ok(content(i)) }
+    });
     assert!(failing.unwrap_err().to_string().contains("no imprint"));
-    let wrong = export(&folder, &entries(5), &config, |i| Ok(Content { mask: Mask::filled(3, 3, true), ..content(i) }));
-    assert!(matches!(wrong, Err(ExportError::Size { .. })));
-    assert!(matches!(run(&folder, 0, &config), Err(ExportError::Nothing)));
+    let wrong = export(&folder, &entries(5), &config, &Rig::lab(), |i| {
+        Ok(Content { mask: Mask::filled(3, 3, true), ..content(i) })
+    });
+    assert!(wrong.unwrap_err().what.contains("pixels, its imprint"));
+    assert!(run(&folder, 0, &config).unwrap_err().what.contains("no mask"));
     assert_eq!(tree(&folder), before);
     // A file that the export did not write is not thrown away.
     std::fs::write(folder.join("train/imgs/mine.png"), b"x").unwrap();
-    assert!(matches!(run(&folder, 5, &config), Err(ExportError::NotOurs { .. })));
+    assert!(run(&folder, 5, &config).unwrap_err().what.contains("not a previous export"));
     std::fs::remove_file(folder.join("train/imgs/mine.png")).unwrap();
     std::fs::write(folder.join(MANIFEST), b"{}").unwrap();
-    assert!(matches!(run(&folder, 5, &config), Err(ExportError::NotOurs { .. })));
-}
-
-#[test]
-fn the_check_finds_what_the_loader_would_trip_over() {
-    let dir = tempfile::tempdir().unwrap();
-    let folder = dir.path().join("unet");
-    run(&folder, 12, &ExportConfig::default()).unwrap();
-    let names: Vec<String> =
-        tree(&folder).into_iter().map(|(n, _)| n).filter(|n| n.starts_with("train/masks")).collect();
-    let file = |i: usize| folder.join(&names[i]);
-    std::fs::remove_file(file(0)).unwrap();
-    images::write_gray8(&file(1), &Grid::filled(175, 140, 7)).unwrap();
-    images::write_gray8(&file(2), &Grid::filled(17, 14, 255)).unwrap();
-    images::write_rgb8(&file(3), &Grid::filled(175, 140, [0.0; 3])).unwrap();
-    std::fs::write(file(4), b"no picture").unwrap();
-    std::fs::write(folder.join("train/imgs/.DS_Store"), b"x").unwrap();
-    std::fs::write(folder.join("val/imgs/a.b.png"), b"x").unwrap();
-    std::fs::remove_dir_all(folder.join("test/masks")).unwrap();
-    let problems = check_folder(&folder).problems;
-    for word in
-        ["1 images and 0 masks", "the value 7", "[17, 14]", "Rgb8", "not a readable PNG", "neither", "cannot list"]
-    {
-        assert!(problems.iter().any(|p| p.what.contains(word)), "{word}: {problems:#?}");
-    }
+    assert!(run(&folder, 5, &config).unwrap_err().what.contains("not a previous export"));
 }

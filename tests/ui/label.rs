@@ -13,7 +13,7 @@ use touch2touch_core::grid::Mask;
 use touch2touch_core::label::{CleanKind, Layers};
 use touch2touch_core::rig::{PadId, lab};
 use touch2touch_pipeline::io::dataset::Dataset;
-use touch2touch_pipeline::io::exchange::check_folder;
+use touch2touch_pipeline::io::exchange::list;
 use touch2touch_pipeline::io::masks::MaskStore;
 
 use super::rig::Rig;
@@ -314,7 +314,7 @@ fn an_export_says_what_goes_where_before_it_writes() {
         .map(|part| std::fs::read_dir(folder.join(part).join("masks")).unwrap().count())
         .sum();
     assert_eq!(written, 5);
-    assert!(check_folder(&folder).problems.is_empty());
+    assert!(list(&folder, None).unwrap().refused.is_empty());
     let state = rig.harness.state().state();
     assert_eq!(state.log.entries.back().unwrap().place.as_deref(), Some(&*folder), "the note leads there");
     assert!(!state.export.asking_masks);

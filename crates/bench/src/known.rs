@@ -27,9 +27,10 @@ use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::rig::lab;
 use touch2touch_core::sample::DepthCamera;
 use touch2touch_core::sensor::Intrinsics;
-use touch2touch_pipeline::io::npz::{self, NpzError};
+use touch2touch_pipeline::io::error::FileError;
+use touch2touch_pipeline::io::npz;
 use touch2touch_pipeline::io::pt::{Tensor, Values};
-use touch2touch_pipeline::io::stl::{self, MeshError};
+use touch2touch_pipeline::io::stl;
 
 pub use simulated::{Suite, stratum};
 
@@ -69,12 +70,9 @@ pub struct Case {
 /// Why a case cannot be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum CaseError {
-    /// The archive.
+    /// The archive, or a tool.
     #[error(transparent)]
-    Npz(#[from] NpzError),
-    /// A tool.
-    #[error(transparent)]
-    Mesh(#[from] MeshError),
+    File(#[from] FileError),
     /// The folder.
     #[error("cannot read the folder ({}): {source}", folder.display())]
     Folder {
@@ -358,7 +356,7 @@ mod tests {
         original.imprints = back.imprints.clone();
         original.grasp_from_object = back.grasp_from_object;
         assert_eq!(back, original);
-        assert!(matches!(CaseSet::open(dir.path()), Err(CaseError::Mesh(_))), "its tool is missing");
+        assert!(matches!(CaseSet::open(dir.path()), Err(CaseError::File(_))), "its tool is missing");
     }
 
     #[test]

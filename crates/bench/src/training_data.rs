@@ -323,7 +323,7 @@ impl<'a> Reader<'a> {
         let entry = dataset.index.get(self.pairs[at]);
         let name = entry.map(|entry| entry.name.clone()).unwrap_or_default();
         let fail = |why: String| Remark { name: name.clone(), why };
-        let sample = dataset.load(self.pairs[at]).map_err(|err| fail(format!("{err} ({})", err.hint())))?;
+        let sample = dataset.load(self.pairs[at]).map_err(|err| fail(format!("{err} ({})", err.hint)))?;
         let labels = labels.load(&name).map_err(|err| fail(err.why))?;
         let tool_name = entry.and_then(|entry| entry.tool.as_deref());
         let number = tool_name.and_then(|name| catalog::tools().iter().position(|tool| tool.name == name));

@@ -7,7 +7,8 @@ pub mod subject;
 use std::borrow::Cow;
 
 use crate::error::TaskError;
-use crate::io::dataset::{ASSUMED_IMPRINT_RANGE_M, Dataset, LoadError, assumed_meters};
+use crate::io::dataset::{ASSUMED_IMPRINT_RANGE_M, Dataset, assumed_meters};
+use crate::io::error::FileError;
 use crate::steps::imprint::picture_of;
 use crate::steps::prediction::Prediction;
 use touch2touch_core::dataset::PairId;
@@ -84,7 +85,7 @@ pub fn compare(predicted: &DepthMap, measured: &DepthMap, scale: Scale) -> Resul
 /// # Errors
 /// If it cannot be read.
 pub fn tile_of(dataset: &Dataset, id: PairId, sample: &Sample) -> Result<Option<DepthMap>, TaskError> {
-    let fail = |err: LoadError| TaskError::from_error("Compare prediction and measurement", &err).with_hint(err.hint());
+    let fail = |err: FileError| TaskError::from_error("Compare prediction and measurement", &err).with_hint(err.hint);
     Ok(dataset.bubble_tile(id, sample.laid).map_err(fail)?.as_ref().map(assumed_meters))
 }
 
@@ -102,7 +103,7 @@ pub struct Beside {
 /// # Errors
 /// If it cannot be read.
 pub fn beside(dataset: &Dataset, id: PairId, sample: &Sample) -> Result<Option<Beside>, TaskError> {
-    let fail = |err: LoadError| TaskError::from_error("Stored picture", &err).with_hint(err.hint());
+    let fail = |err: FileError| TaskError::from_error("Stored picture", &err).with_hint(err.hint);
     let tile = dataset.vqvae_tile(id, sample.laid).map_err(fail)?.as_ref().map(assumed_meters);
     let imprint = dataset.vqvae_imprint(id, sample.laid).map_err(fail)?;
     Ok(tile.zip(imprint).map(|(tile, imprint)| Beside { tile, imprint }))

@@ -68,17 +68,15 @@ impl TaskError {
 
     /// The end of a task that was told to stop.
     pub fn cancelled(what: impl Into<String>) -> Self {
-        Self { what: what.into(), why: "cancelled".into(), hint: None, kind: TaskErrorKind::Cancelled, units: None }
+        Self { kind: TaskErrorKind::Cancelled, ..Self::new(what, "cancelled") }
     }
 
     /// A panic caught at the edge of a worker.
     pub fn panicked(what: impl Into<String>, message: &str) -> Self {
+        let hint = "Nothing is lost. Please report this with the steps that led here.";
         Self {
-            what: what.into(),
-            why: format!("an internal error: {message}"),
-            hint: Some("Nothing is lost. Please report this with the steps that led here.".into()),
             kind: TaskErrorKind::Panicked,
-            units: None,
+            ..Self::new(what, format!("an internal error: {message}")).with_hint(hint)
         }
     }
 

@@ -10,11 +10,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use serde::Serialize;
-use strum::{EnumIter, EnumString, IntoStaticStr};
+use strum::EnumIter;
 
 use crate::error::TaskError;
 use crate::io::dataset::Dataset;
-use crate::io::exchange::{self, Content, ExportConfig, ExportEntry, ExportReport, Format, LoadFailure};
+use crate::io::exchange::{self, Content, ExportEntry, ExportReport};
+pub use crate::io::exchange::{ExportChoice, Which};
 use crate::job::JobCx;
 use crate::labels::{DrawnMask, Labels, PairLabels, Review};
 use touch2touch_core::dataset::{PairId, Split};
@@ -67,44 +68,6 @@ impl DrawnMasks<'_> {
         reviews.extend(self.changed.iter().map(|(pair, labels)| (pair.clone(), labels.review)));
         reviews
     }
-}
-
-/// Pairs that go along, by their review state. Pairs marked *skip* or *flagged* never do.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, EnumIter, EnumString, IntoStaticStr)]
-#[strum(serialize_all = "snake_case")]
-pub enum Which {
-    /// Pairs marked *done* that have a mask drawn by hand.
-    #[default]
-    Done,
-    /// Pairs as above, and pairs whose mask was begun.
-    Begun,
-    /// All pairs; the masks that nobody drew are made (`--mask`).
-    All,
-}
-
-impl Which {
-    /// The name on the command line.
-    pub fn key(self) -> &'static str {
-        self.into()
-    }
-}
-
-/// Choices that a person has for an export.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct ExportChoice {
-    /// Pairs, by review state.
-    pub which: Which,
-    /// True where pairs that the data set keeps for tests (`test_only`) are divided like the rest; else they go to
-    /// test.
-    pub test_in_train: bool,
-    /// True where all pairs of a tool go to the same part.
-    pub by_tool: bool,
-    /// True where only pixels that a person painted count; all others are ignored.
-    pub manual_checked: bool,
-    /// Decides which pair lands in which part.
-    pub seed: u64,
-    /// In which form.
-    pub format: Format,
 }
 
 /// Pairs and choices of an export.
@@ -185,16 +148,6 @@ impl Plan {
     }
 }
 
-fn split_of(dataset: &Dataset, choice: ExportChoice) -> ExportConfig {
-    ExportConfig {
-        format: choice.format,
-        seed: choice.seed,
-        by_tool: choice.by_tool,
-        held_out_in_train: choice.test_in_train,
-        rig: dataset.rig.clone(),
-    }
-}
-
 /// Division of the masks among the parts. Reads the review states and the names of the masks, no pixels.
 ///
 /// # Errors
@@ -230,7 +183,7 @@ pub fn plan(dataset: &Dataset, masks: &DrawnMasks<'_>, setup: &ExportSetup) -> R
             plan.ids.push(id);
         }
     }
-    plan.counts = exchange::counts(&plan.entries, &split_of(dataset, choice));
+    plan.counts = exchange::counts(&plan.entries, &choice);
     plan.drawn = drawn;
     Ok(plan)
 }
@@ -269,9 +222,9 @@ pub fn export_masks(
         exchange::check_stored(store, stored).map_err(|err| TaskError::from_error(WHAT, &err))?;
     }
     let total = entries.len() as u64;
-    let report = exchange::export(folder, entries, &split_of(dataset, setup.choice), |at| {
+    let report = exchange::export(folder, entries, &setup.choice, &dataset.rig, |at| {
         let entry = &entries[at];
-        cx.check(WHAT).map_err(|_| LoadFailure::Stop)?;
+        cx.check(WHAT)?;
         cx.progress(at as u64, total, format!("{}, {}", entry.pair, dataset.rig.pad_key(entry.finger)));
         let sample = dataset.load(plan.ids[at])?;
         let bubble = sample.pad(entry.finger).and_then(|touch| touch.depth());

@@ -13,8 +13,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 
 use crate::error::TaskError;
-use crate::io::dataset::{Dataset, LoadError, OpenError};
-use crate::io::pt::PtError;
+use crate::io::dataset::Dataset;
+use crate::io::error::{FileError, FileErrorKind};
 use crate::job::Cancel;
 use crate::labels::{Labels, PairLabels};
 use touch2touch_core::dataset::{PairEntry, PairId, Problem};
@@ -94,15 +94,6 @@ pub enum FollowEvent {
     Ready(Ready),
 }
 
-/// Stage of a touch on its way through the queues.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Stage {
-    /// In a queue.
-    Waiting,
-    /// Nothing to do until the file changes.
-    Rests,
-}
-
 #[derive(Clone, Debug)]
 struct FollowedPair {
     id: PairId,
@@ -110,7 +101,8 @@ struct FollowedPair {
     /// All files of the pair.
     files: Vec<PathBuf>,
     stamp: Stamp,
-    stage: Stage,
+    /// True until it was given out, and again once it changed.
+    waiting: bool,
     completed: bool,
     /// When this stamp was first seen.
     since: Instant,
@@ -143,9 +135,9 @@ impl Following {
     /// Follows `path`, which may still be empty; `existing` takes up what lies there already as well.
     ///
     /// # Errors
-    /// [`OpenError::Io`] if the folder is not there.
-    pub fn new(path: &Path, existing: bool) -> Result<Self, OpenError> {
-        let io = |source| OpenError::Io { path: path.to_owned(), source };
+    /// [`FileError`] if the folder is not there.
+    pub fn new(path: &Path, existing: bool) -> Result<Self, FileError> {
+        let io = |err| FileError::io(path, "cannot read the folder", err);
         let path = path.canonicalize().map_err(io)?;
         drop(std::fs::read_dir(&path).map_err(io)?);
         let mut following = Self::of(path, existing);
@@ -250,7 +242,7 @@ impl Following {
             if stamp != seen.stamp {
                 (seen.stamp, seen.since, seen.completed) = (stamp, now, false);
             }
-            seen.stage = Stage::Rests;
+            seen.waiting = false;
             let completed = seen.completed;
             return Some(Ready { id: seen.id, file: seen.file.clone(), stamp, fresh, completed, name });
         }
@@ -272,7 +264,7 @@ impl Following {
         } else {
             match result {
                 Ok(sample) => return Some(Ok(sample)),
-                Err(err) if !may_heal(&err) || now.duration_since(seen.since) >= PATIENCE => {
+                Err(err) if err.kind != FileErrorKind::Failed || now.duration_since(seen.since) >= PATIENCE => {
                     return Some(Err(err.to_problem()));
                 }
                 Err(_) => {}
@@ -281,7 +273,7 @@ impl Following {
         // Soon at first, as most files are whole within milliseconds; a slow copy is not read again and again.
         let age = now.duration_since(seen.since);
         seen.retry = now + (age / 8).clamp(PERIOD, Duration::from_millis(200));
-        seen.stage = Stage::Waiting;
+        seen.waiting = true;
         let queue = if ready.fresh { &mut self.fresh } else { &mut self.backlog };
         queue.push_back(ready.name.clone());
         None
@@ -303,7 +295,7 @@ impl Following {
                 self.dataset = Some(Arc::new(dataset));
                 self.enter(now, first);
             }
-            Err(OpenError::NothingFound { .. }) => {
+            Err(err) if err.kind == FileErrorKind::NothingFound => {
                 self.folders = vec![(self.path.clone(), modified(&self.path))];
                 let known = self.dataset.as_ref().map_or(0, |dataset| dataset.index.pairs.len());
                 // An empty folder is one that fills; an emptied one has lost something.
@@ -328,8 +320,8 @@ impl Following {
     /// Compares the files of the data set with what was seen of them.
     fn enter(&mut self, now: Instant, first: bool) {
         let Some(dataset) = self.dataset.clone() else { return };
-        let time = |folder: PathBuf| (folder.clone(), modified(&folder));
-        self.folders = dataset.folders().into_iter().map(time).collect();
+        let time = |folder: &PathBuf| (folder.clone(), modified(folder));
+        self.folders = dataset.folders().iter().map(time).collect();
         for (at, entry) in dataset.index.pairs.iter().enumerate() {
             let id = PairId(at as u32);
             let Some(file) = dataset.gelslim_file(id) else { continue };
@@ -345,17 +337,24 @@ impl Following {
             match known {
                 Some(seen) if seen.stamp == stamp && seen.files == files => continue,
                 Some(seen) => {
-                    let queued = seen.stage == Stage::Waiting;
+                    let queued = seen.waiting;
                     let completed = !queued && seen.stamp == stamp && seen.file == file;
-                    let stage = Stage::Waiting;
-                    *seen = FollowedPair { id, file, files, stamp, stage, completed, since: now, retry: now };
+                    *seen = FollowedPair { id, file, files, stamp, waiting: true, completed, since: now, retry: now };
                     if queued {
                         continue;
                     }
                 }
                 None => {
-                    let stage = if wanted { Stage::Waiting } else { Stage::Rests };
-                    let seen = FollowedPair { id, file, files, stamp, stage, completed: false, since: now, retry: now };
+                    let seen = FollowedPair {
+                        id,
+                        file,
+                        files,
+                        stamp,
+                        waiting: wanted,
+                        completed: false,
+                        since: now,
+                        retry: now,
+                    };
                     self.seen.insert(entry.name.clone(), seen);
                     if !wanted {
                         continue;
@@ -370,15 +369,4 @@ impl Following {
 
 fn modified(folder: &Path) -> Option<SystemTime> {
     std::fs::metadata(folder).ok()?.modified().ok()
-}
-
-/// True for an error that can be that of a file that is not written to its end yet.
-fn may_heal(err: &LoadError) -> bool {
-    !matches!(
-        err,
-        LoadError::Pt(PtError::MissingKey { .. } | PtError::NotATensor { .. } | PtError::WrongShape { .. })
-            | LoadError::Sizes { .. }
-            | LoadError::MostlyInvalid { .. }
-            | LoadError::NoSuchPair { .. }
-    )
 }

@@ -9,6 +9,7 @@ pub mod dataset;
 pub mod dataset_location;
 pub mod digest;
 pub mod doctor;
+pub mod error;
 pub mod exchange;
 pub mod files;
 pub mod folders;

@@ -107,11 +107,6 @@ impl Review {
         self.into()
     }
 
-    /// The state of a name in files; `None` for an unknown one.
-    pub fn from_stored(name: &str) -> Option<Self> {
-        name.parse().ok()
-    }
-
     /// True where nothing more is to be done.
     pub fn is_finished(self) -> bool {
         matches!(self, Self::Done | Self::Skip)

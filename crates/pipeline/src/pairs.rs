@@ -1,9 +1,26 @@
 //! Choice of pairs for a pass over a data set.
 
+use touch2touch_core::rig::{PadId, Rig};
+
 /// The positions of at most `limit` of `len` things, spread evenly; all of them without a limit.
 pub fn spread(len: usize, limit: Option<usize>) -> impl ExactSizeIterator<Item = usize> {
     let taken = limit.map_or(len, |limit| limit.min(len));
     (0..taken).map(move |i| i * len / taken)
+}
+
+/// The pads of a rig that a name means: one, or all of them by `both`. A rig with a single one has no other, however it is
+/// called.
+///
+/// # Errors
+/// If no pad has this name; those that there are are said.
+pub fn pads_named(rig: &Rig, name: &str) -> Result<Vec<PadId>, String> {
+    let (all, name) = (rig.pad_list(), name.to_lowercase());
+    if name == "both" || all.len() == 1 {
+        return Ok(all);
+    }
+    let names: Vec<_> = all.iter().map(|pad| rig.pad_key(*pad)).collect();
+    let lacks = || format!("there is no finger \"{name}\"; name one of {} or both", names.join(", "));
+    Ok(vec![rig.pad_of_key(&name).ok_or_else(lacks)?])
 }
 
 #[cfg(test)]

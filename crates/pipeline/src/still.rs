@@ -15,7 +15,7 @@ use crate::job::JobCx;
 use crate::labels::PairLabels;
 use crate::steps::models::Models;
 use crate::steps::recipe::Recipe;
-use space::{Ground, InSpace, SpaceInput, SpacePane, SpacePicture, SpaceView, ViewAngles, in_space};
+use space::{Ground, InSpace, SpacePane, SpacePicture, SpaceView, ViewAngles, in_space};
 use touch2touch_core::dataset::PairId;
 
 const WHAT: &str = "Still";
@@ -103,9 +103,8 @@ pub fn still(
     let sample = dataset
         .load(setup.pair)
         .map(Arc::new)
-        .map_err(|err| TaskError::from_error(format!("{WHAT}: load {name}"), &err).with_hint(err.hint()))?;
-    let input = SpaceInput { dataset, pair: setup.pair, recipe: &setup.recipe, labels: &setup.labels, models };
-    let pair = in_space(input, &sample, setup.pane.sides(), setup.distance_m.is_some(), cx)?;
+        .map_err(|err| TaskError::from_error(format!("{WHAT}: load {name}"), &err).with_hint(err.hint))?;
+    let pair = in_space(dataset, setup, &sample, models, cx)?;
     let frames = setup.turntable.unwrap_or(1);
     if setup.turntable.is_some() {
         std::fs::create_dir_all(out)

@@ -31,16 +31,7 @@ pub(crate) fn stack<'py, 'g, T: Element + Copy + 'g>(
     images: impl Iterator<Item = Option<&'g Grid<T>>>,
     missing: T,
 ) -> PyResult<Option<Array<'py, T>>> {
-    let images: Vec<Option<&Grid<T>>> = images.collect();
-    let Some([width, height]) = size_of(&images)? else { return Ok(None) };
-    let mut values = Vec::with_capacity(images.len() * width * height);
-    for image in &images {
-        match image {
-            Some(image) => values.extend_from_slice(image.as_slice()),
-            None => values.resize(values.len() + width * height, missing),
-        }
-    }
-    array(py, values, &[images.len(), height, width]).map(Some)
+    stacked(py, images, Grid::as_slice, &[], missing)
 }
 
 /// Color images likewise as (pads, height, width, 3).
@@ -51,25 +42,26 @@ pub(crate) fn stack_rgb<'py, 'g>(
     py: Python<'py>,
     images: impl Iterator<Item = Option<&'g RgbGrid>>,
 ) -> PyResult<Option<Array<'py, f32>>> {
-    let images: Vec<Option<&RgbGrid>> = images.collect();
-    let Some([width, height]) = size_of(&images)? else { return Ok(None) };
-    let mut values = Vec::with_capacity(3 * images.len() * width * height);
-    for image in &images {
-        match image {
-            Some(image) => values.extend(image.as_slice().iter().flatten()),
-            None => values.resize(values.len() + 3 * width * height, f32::NAN),
-        }
-    }
-    array(py, values, &[images.len(), height, width, 3]).map(Some)
+    stacked(py, images, |image| image.as_slice().as_flattened(), &[3], f32::NAN)
 }
 
-fn size_of<T>(images: &[Option<&Grid<T>>]) -> PyResult<Option<[usize; 2]>> {
+fn stacked<'py, 'g, P: 'g, T: Element + Copy + 'g>(
+    py: Python<'py>,
+    images: impl Iterator<Item = Option<&'g Grid<P>>>,
+    values: impl Fn(&'g Grid<P>) -> &'g [T],
+    channels: &[usize],
+    missing: T,
+) -> PyResult<Option<Array<'py, T>>> {
+    let images: Vec<Option<&Grid<P>>> = images.collect();
     let mut sizes = images.iter().flatten().map(|image| image.size());
     let Some(size) = sizes.next() else { return Ok(None) };
-    match sizes.find(|other| *other != size) {
-        Some(other) => Err(refused(format!("the pads' images differ in size: {size:?} and {other:?}"))),
-        None => Ok(Some(size)),
+    if let Some(other) = sizes.find(|other| *other != size) {
+        return Err(refused(format!("the pads' images differ in size: {size:?} and {other:?}")));
     }
+    let each = size.iter().chain(channels).product();
+    let flat =
+        images.iter().flat_map(|image| image.map_or_else(|| vec![missing; each], |image| values(image).to_vec()));
+    array(py, flat.collect(), &[&[images.len(), size[1], size[0]][..], channels].concat()).map(Some)
 }
 
 /// Points as (N, 3).

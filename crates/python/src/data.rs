@@ -65,7 +65,7 @@ pub(crate) fn open(
     tool_unit: Option<String>,
 ) -> PyResult<Dataset> {
     py.detach(|| {
-        let source = Source::open(&path).map_err(|err| refused(format!("{err}; {}", err.hint())))?;
+        let source = Source::open(&path).map_err(|err| refused(format!("{err}; {}", err.hint)))?;
         let readings = read_as.as_deref().map(parse_list).transpose().map_err(refused)?;
         let mut source = match readings {
             Some(readings) => source.reading(readings),

@@ -236,10 +236,6 @@ fn felt(
     pair.with_touch(tool, |touch| way::estimate(touch, recipe, stage, &process.models, cx))
 }
 
-fn shared(tool: Option<&Tool>) -> Option<Arc<Tool>> {
-    tool.map(|tool| Arc::new(Tool::of(&tool.name, tool.model.clone())))
-}
-
 /// The results of a touch up to a stage ("imprint", "mask", "cloud", "pose"), as the studio and `touch2touch pose` have them.
 ///
 /// `recipe`: a `Recipe` (default: the measured imprint, the shipped mask model, the default registration). `tool`: another
@@ -253,7 +249,7 @@ pub(crate) fn estimate(
     stage: &str,
     tool: Option<&Tool>,
 ) -> PyResult<Estimate> {
-    let (stage, tool) = (recipe::stage(stage)?, shared(tool));
+    let (stage, tool) = (recipe::stage(stage)?, tool.map(|tool| Arc::new(Tool::of(&tool.name, tool.model.clone()))));
     let whole = given_or(py, recipe, "measured")?;
     let results = watched(py, None, |process, cx| felt(pair, tool.as_ref(), &whole, stage, process, cx))?;
     Ok(Estimate::of(results, pair))
@@ -293,10 +289,6 @@ fn registered(points: &[DVec3], tool: &Tool, by: Registration, evidence: bool) -
     pose(contacts, &tool.model, &*by.method(), Ask { evidence, ..Ask::default() }, None)
 }
 
-fn choice(engine: &str) -> PyResult<Registration> {
-    engine.parse().map_err(refused)
-}
-
 /// The pose of a tool from contact points (N, 3), float64, meters, grasp frame: for any grasp, not only ours. An array that lies
 /// row by row is read where it is: another thread must not write to it meanwhile.
 ///
@@ -311,7 +303,7 @@ pub(crate) fn register(
     engine: &str,
     evidence: bool,
 ) -> PyResult<Pose> {
-    let (points, by) = (points_of(&points, "points")?, choice(engine)?);
+    let (points, by) = (points_of(&points, "points")?, engine.parse::<Registration>().map_err(refused)?);
     let result = py.detach(|| registered(&points, tool, by, evidence)).map_err(|err| failed(&err))?;
     Ok(Pose { result })
 }
@@ -327,7 +319,7 @@ pub(crate) fn register_many(
     evidence: bool,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Vec<Option<Pose>>> {
-    let by = choice(engine)?;
+    let by = engine.parse::<Registration>().map_err(refused)?;
     let clouds = clouds.iter().map(|points| points_of(points, "points")).collect::<PyResult<Vec<_>>>()?;
     let found = watched(py, progress, |_, cx| {
         let one = |points: &Cow<'_, [DVec3]>| {

@@ -4,21 +4,22 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use serde_json::json;
 use strum::IntoEnumIterator as _;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::label::{CleanUp, Drawing};
-use touch2touch_core::rig::{PadId, Rig};
 use touch2touch_pipeline::export::{self, Automatic, DrawnMasks, ExportChoice, ExportSetup, Which};
 use touch2touch_pipeline::io::exchange::Format;
 use touch2touch_pipeline::labels::Review;
 use touch2touch_pipeline::masks::label_pair::{Begin, LabelSetup, label_pair};
 use touch2touch_pipeline::masks::propose::ProposalSource;
+use touch2touch_pipeline::pairs::pads_named;
 
 use crate::data::{Pair, dataset_of};
 use crate::process::{refused, watched};
 use crate::recipe::{Recipe, choice, given_or};
+use crate::tables::python;
 
 /// Changes what people said about a pair, and stores it beside the data as the studio does: each change is a line of the pair's
 /// journal, which undo takes back. Nothing is stored of what cannot be done to its end. The function behind `touch2touch label`.
@@ -58,7 +59,7 @@ pub(crate) fn label(
     let reviews = Review::iter().map(|review| (review.into(), review));
     let setup = LabelSetup {
         imprint: recipe.imprint,
-        pads: pads(finger, &dataset.rig)?,
+        pads: pads_named(&dataset.rig, finger).map_err(refused)?,
         begin: begin.map(|name| begun(name, over_drawn)).transpose()?.unwrap_or_default(),
         draw: draw.unwrap_or_default().iter().map(|one| drawing(py, one)).collect::<PyResult<_>>()?,
         clean: clean
@@ -86,18 +87,6 @@ pub(crate) fn label(
 
 fn nowhere() -> PyErr {
     refused("a pair that was simulated here has no place for labels: write a data set with `touch2touch simulate`")
-}
-
-fn pads(finger: &str, rig: &Rig) -> PyResult<Vec<PadId>> {
-    let all = rig.pad_list();
-    match (finger, rig.pad_of_key(finger)) {
-        ("both", _) => Ok(all),
-        (_, Some(pad)) => Ok(vec![pad]),
-        (_, None) => {
-            let names: Vec<_> = all.iter().map(|pad| rig.pad_key(*pad)).collect();
-            Err(refused(format!("finger: there is no {finger:?}; there are {}, both", names.join(", "))))
-        }
-    }
 }
 
 fn begun(name: &str, over_drawn: bool) -> PyResult<Begin> {
@@ -138,7 +127,7 @@ pub(crate) fn export_masks<'py>(
     seed: u64,
     recipe: Option<&Recipe>,
     progress: Option<&Bound<'_, PyAny>>,
-) -> PyResult<Bound<'py, PyDict>> {
+) -> PyResult<Bound<'py, PyAny>> {
     let data = dataset_of(py, data)?;
     let formats = Format::iter().map(|format| (format.key(), format));
     let format = format.map(|name| choice("format", name, formats)).transpose()?.unwrap_or_default();
@@ -158,11 +147,7 @@ pub(crate) fn export_masks<'py>(
             (which == Which::All).then(|| Automatic::new(&opened.source, &recipe, &process.models, &|_| ()));
         export::export_masks(&opened.source, &masks, &setup, &out, automatic, cx)
     })?;
-    let counts = PyDict::new(py);
-    for (part, count) in ["train", "val", "test"].into_iter().zip(plan.counts) {
-        counts.set_item(part, count)?;
-    }
-    counts.set_item("by_hand", plan.by_hand)?;
-    counts.set_item("left_out", plan.left_out.values().sum::<usize>())?;
-    Ok(counts)
+    let [train, val, test] = plan.counts;
+    let left_out: usize = plan.left_out.values().sum();
+    python(py, &json!({"train": train, "val": val, "test": test, "by_hand": plan.by_hand, "left_out": left_out}))
 }

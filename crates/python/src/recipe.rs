@@ -110,18 +110,7 @@ pub(crate) fn choice<T>(what: &str, name: &str, all: impl IntoIterator<Item = (&
 /// # Errors
 /// If there is none.
 pub(crate) fn stage(name: &str) -> PyResult<Stage> {
-    Ok(match name {
-        "prediction" => Stage::Prediction,
-        "imprint" => Stage::Imprint,
-        "mask" => Stage::Mask,
-        "cloud" => Stage::Cloud,
-        "pose" => Stage::Pose,
-        other => {
-            return Err(refused(format!(
-                "there is no stage {other:?}; there are prediction, imprint, mask, cloud, pose"
-            )));
-        }
-    })
+    choice("stage", name, Stage::iter().map(|stage| (stage.into(), stage)))
 }
 
 /// The recipe that was given, else the one that goes without saying for this imprint.

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 use serde::Serialize;
+use serde_json::json;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::evaluation::{self, GraspScore, paper_rows};
 use touch2touch_core::rig::Rig;
@@ -12,7 +12,7 @@ use touch2touch_pipeline::infer::bundle::Origin;
 use touch2touch_pipeline::learn::adapt::{AdaptSetup, Tuning, adapt as fit};
 use touch2touch_pipeline::learn::tuning::unfinished_folder;
 use touch2touch_pipeline::scores::evaluate::{Evaluation, Report, Setup, evaluate as score};
-use touch2touch_pipeline::steps::bundles::{self as found, BundleKind};
+use touch2touch_pipeline::steps::bundles::{self as found, BundleInfo, BundleKind};
 use touch2touch_pipeline::steps::recipe::Recipe as Whole;
 
 use crate::data::dataset_of;
@@ -20,7 +20,7 @@ use crate::process::{refused, watched};
 use crate::recipe::{Recipe, given_or};
 
 /// A JSON object as Python's dictionaries and lists.
-fn python<'py>(py: Python<'py>, value: &impl Serialize) -> PyResult<Bound<'py, PyAny>> {
+pub(crate) fn python<'py>(py: Python<'py>, value: &impl Serialize) -> PyResult<Bound<'py, PyAny>> {
     let text = serde_json::to_string(value).map_err(refused)?;
     py.import("json")?.call_method1("loads", (text,))
 }
@@ -69,7 +69,7 @@ impl Scores {
     }
 }
 
-fn take(kind: BundleKind, all: &[touch2touch_pipeline::steps::bundles::BundleInfo]) -> Option<Origin> {
+fn take(kind: BundleKind, all: &[BundleInfo]) -> Option<Origin> {
     all.iter().find(|bundle| bundle.kind == kind && !bundle.is_own()).map(|bundle| bundle.origin.clone())
 }
 
@@ -158,16 +158,11 @@ pub(crate) fn adapt<'py>(
 
 /// The model bundles that are there: shipped with the package, and in the user's folders. Name, kind, folder, identity.
 #[pyfunction]
-pub(crate) fn bundles(py: Python<'_>) -> PyResult<Vec<Bound<'_, PyDict>>> {
-    let all = py.detach(|| found::find(&[]).bundles);
-    let one = |bundle: &touch2touch_pipeline::steps::bundles::BundleInfo| {
-        let row = PyDict::new(py);
-        row.set_item("name", &bundle.name)?;
-        row.set_item("kind", bundle.kind.name())?;
-        row.set_item("at", bundle.origin.to_string())?;
-        row.set_item("id", &*bundle.id)?;
-        row.set_item("fits", bundle.fits(&Rig::lab()))?;
-        Ok(row)
+pub(crate) fn bundles(py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
+    let one = |bundle: &BundleInfo| {
+        let (kind, fits) = (bundle.kind.name(), bundle.fits(&Rig::lab()));
+        json!({"name": bundle.name, "kind": kind, "at": bundle.origin.to_string(), "id": &*bundle.id, "fits": fits})
     };
-    all.iter().map(one).collect()
+    let all: Vec<_> = py.detach(|| found::find(&[]).bundles.iter().map(one).collect());
+    python(py, &all)
 }

@@ -50,7 +50,7 @@ impl Tool {
                 let file: PathBuf = source.extract()?;
                 let scale = unit.map(str::parse::<ToolScale>).transpose().map_err(refused)?;
                 let mesh = py.detach(|| read_in_meters(&file, scale));
-                let mesh = mesh.map_err(|err| refused(format!("{err}. {}", err.hint())))?;
+                let mesh = mesh.map_err(|err| refused(format!("{err}. {}", err.hint)))?;
                 (mesh, file.file_stem().unwrap_or_default().to_string_lossy().into_owned())
             }
             Some(faces) => {

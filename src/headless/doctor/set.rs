@@ -4,9 +4,10 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use serde::Serialize;
+use serde_json::json;
 
+use super::super::VerbResult;
 use super::super::args::DatasetArgs;
-use super::super::{Common, Output, VerbResult};
 use touch2touch_core::read_as::{ReadAs, parse_list};
 use touch2touch_pipeline::doubts::read_otherwise;
 use touch2touch_pipeline::io::dataset::{Dataset, ToolUnit};
@@ -68,22 +69,16 @@ impl Setting {
 }
 
 /// Says it all, in order.
-pub(super) fn run(dataset: &DatasetArgs, settings: &[Setting], common: Common) -> VerbResult {
-    #[derive(Serialize)]
-    struct Report {
-        set: Vec<Said>,
-    }
-
-    let dataset = dataset.open()?;
-    let set = settings.iter().map(|setting| setting.say(&dataset)).collect::<anyhow::Result<_>>()?;
-    let report = Report { set };
-    Output::new(common, "writing", 1).finish(&report, || {
+pub(super) fn run(args: &DatasetArgs, settings: &[Setting]) -> VerbResult {
+    let dataset = args.open()?;
+    let set = settings.iter().map(|setting| setting.say(&dataset)).collect::<anyhow::Result<Vec<Said>>>()?;
+    args.output("writing", 1).finish(&json!({"set": set}), || {
         let line = |said: &Said| match &said.file {
             Some(file) if said.because.is_empty() => format!("{} says {}\n", file.display(), said.word),
             Some(file) => format!("{} says {}, because {}\n", file.display(), said.word, said.because.join(" and ")),
             None => "read as it is stored\n".to_owned(),
         };
-        report.set.iter().map(line).collect()
+        set.iter().map(line).collect()
     })?;
     Ok(true)
 }

@@ -4,11 +4,9 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::super::Common;
-use super::super::args::{DatasetArgs, FingerArg, RegistrationArgs, keyed};
-use super::super::contact_mask::MaskArgs;
+use super::super::args::{DatasetArgs, keyed};
 use super::super::pose::parse_start;
-use super::super::recipe::ModelArgs;
+use super::super::recipe::RecipeArgs;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::label::{CleanUp, Drawing};
 use touch2touch_pipeline::labels::{ImprintSource, Review};
@@ -70,16 +68,10 @@ pub(in super::super) struct LabelArgs {
     pub(super) person: Option<String>,
     /// The finger whose mask is changed: its name, or `both`.
     #[arg(long, default_value = "both")]
-    pub(super) finger: FingerArg,
+    pub(super) finger: String,
     /// The imprint whose mask is changed. A prediction is the one that `--bundle`, `--seed` and the like name.
     #[arg(long, default_value = ImprintSource::Measured.key(), value_parser = keyed::<ImprintSource>())]
     pub(super) imprint: ImprintSource,
     #[command(flatten)]
-    pub(super) registration: RegistrationArgs,
-    #[command(flatten)]
-    pub(super) mask: MaskArgs,
-    #[command(flatten)]
-    pub(super) model: ModelArgs,
-    #[command(flatten)]
-    pub(super) common: Common,
+    pub(super) recipe: RecipeArgs,
 }

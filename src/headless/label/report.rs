@@ -1,13 +1,10 @@
 //! Labels that are stored of pairs, for programs and for people.
 
-use std::path::PathBuf;
-
 use serde::Serialize;
 
 use touch2touch_core::grid::Mask;
 use touch2touch_core::manual::AcceptedPose;
 use touch2touch_pipeline::io::dataset::Dataset;
-use touch2touch_pipeline::labels::progress::Counts;
 use touch2touch_pipeline::labels::{ImprintOf, PairLabels};
 
 /// Labels that are stored of a pair.
@@ -41,7 +38,7 @@ impl Stored {
             review: labels.review.stored(),
             masks,
             predicted,
-            accepted: labels.accepted.iter().map(|(of, pose)| Accepted::new(of, *pose)).collect(),
+            accepted: labels.accepted.iter().map(|(of, pose)| Accepted { of: of.clone(), pose: *pose }).collect(),
             note: labels.note.clone(),
         }
     }
@@ -51,10 +48,10 @@ impl Stored {
         masks.extend(self.predicted.iter().map(|(pad, px, _)| format!("{pad} {px} px on a prediction")));
         let masks = if masks.is_empty() { "no hand-drawn mask".to_owned() } else { masks.join(", ") };
         let mut text = format!("{}: {}; {masks}", self.name, self.review);
-        for Accepted { what, pose, .. } in &self.accepted {
+        for Accepted { of, pose } in &self.accepted {
             let place = pose.pose.inverse();
             let by = if pose.by_hand { ", by hand" } else { "" };
-            text += &format!("; pose {:.1}° accepted of {what}{by}", place.theta_rad.to_degrees());
+            text += &format!("; pose {:.1}° accepted of {}{by}", place.theta_rad.to_degrees(), of.text());
         }
         if !self.note.is_empty() {
             text += &format!("; note: {}", self.note);
@@ -68,25 +65,6 @@ impl Stored {
 struct Accepted {
     /// The imprint that it is of.
     of: ImprintOf,
-    #[serde(skip)]
-    what: String,
     #[serde(flatten)]
     pose: AcceptedPose,
-}
-
-impl Accepted {
-    fn new(of: &ImprintOf, pose: AcceptedPose) -> Self {
-        Self { of: of.clone(), what: of.text(), pose }
-    }
-}
-
-/// Answer of `label`.
-#[derive(Debug, Serialize)]
-pub(super) struct Report {
-    /// Folder of the labels.
-    pub(super) folder: PathBuf,
-    /// The labeled pair, or all that are labeled.
-    pub(super) pairs: Vec<Stored>,
-    /// All pairs of the data set by review state.
-    pub(super) counts: Counts,
 }

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::super::VerbResult;
 use super::super::args::{DatasetArgs, keyed};
-use super::super::{Common, Output, VerbResult};
 use touch2touch_pipeline::export::import::{ImportSetup, import_masks, plan_import};
 use touch2touch_pipeline::io::exchange::Format;
 
@@ -29,13 +29,11 @@ pub(in super::super) struct ImportArgs {
     /// Show what would be imported and write nothing.
     #[arg(long)]
     dry_run: bool,
-    #[command(flatten)]
-    common: Common,
 }
 
 pub(super) fn run(args: &ImportArgs) -> VerbResult {
     let dataset = args.dataset.open()?;
-    let output = Output::new(args.common, "importing", 1);
+    let output = args.dataset.output("importing", 1);
     let setup = ImportSetup {
         from: args.from.clone(),
         format: args.format,

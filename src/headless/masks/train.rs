@@ -6,9 +6,9 @@ use std::time::Duration;
 
 use clap::Args;
 
+use super::super::VerbResult;
 use super::super::args::{DatasetArgs, RegistrationArgs, keyed, parse_minutes};
 use super::super::recipe::{RuntimeArg, kept};
-use super::super::{Common, Output, VerbResult};
 use touch2touch_core::units::counted;
 use touch2touch_pipeline::export::DrawnMasks;
 use touch2touch_pipeline::labels::Labels;
@@ -65,13 +65,11 @@ pub(in crate::headless) struct TrainArgs {
     /// Neither keep a run that is stopped, nor look for one, nor for predictions that were made before.
     #[arg(long)]
     no_cache: bool,
-    #[command(flatten)]
-    common: Common,
 }
 
 pub(super) fn run(args: &TrainArgs) -> VerbResult {
     let dataset = args.dataset.open()?;
-    let output = Output::new(args.common, "training", 1);
+    let output = args.dataset.output("training", 1);
     let labels = Labels::of(&dataset);
     let masks = DrawnMasks { labels: &labels, changed: &BTreeMap::new() };
     let choice = TrainChoice {

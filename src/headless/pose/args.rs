@@ -1,15 +1,13 @@
 //! The arguments of `pose`.
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 
-use super::super::Common;
-use super::super::args::{DatasetArgs, PairArgs, RegistrationArgs};
-use super::super::contact_mask::MaskArgs;
-use super::super::recipe::ModelArgs;
+use super::super::args::{DatasetArgs, PairArgs, keyed};
+use super::super::recipe::RecipeArgs;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::rig::Rig;
-use touch2touch_pipeline::labels::ImprintSource;
 use touch2touch_pipeline::steps::recipe::Recipe;
+use touch2touch_pipeline::still::space::SpacePane;
 
 /// Arguments of `pose`.
 #[derive(Debug, Args)]
@@ -17,16 +15,12 @@ pub(in crate::headless) struct PoseArgs {
     #[command(flatten)]
     pub(super) dataset: DatasetArgs,
     /// Imprints to use.
-    #[arg(long, value_enum, default_value_t = Imprints::Measured)]
-    pub(super) imprint: Imprints,
-    #[command(flatten)]
-    pub(super) mask: MaskArgs,
+    #[arg(long, value_parser = keyed::<SpacePane>(), default_value = "measured")]
+    pub(super) imprint: SpacePane,
     /// Use the CAD model of another tool: a tool of the data set, or `any`, which tries all, takes the most likely and
     /// lists the others.
     #[arg(long = "tool", value_name = "NAME")]
     pub(super) which: Option<String>,
-    #[command(flatten)]
-    pub(super) registration: RegistrationArgs,
     /// Start here instead of where the registration would: `DEGREES,Y_MM,Z_MM` of the tool in the hand, such as
     /// `10,0,-2`. Repeat for several.
     #[arg(long = "start", value_name = "DEG,MM,MM", value_parser = parse_start, allow_hyphen_values = true)]
@@ -38,16 +32,7 @@ pub(in crate::headless) struct PoseArgs {
     #[arg(long)]
     pub(super) trace: bool,
     #[command(flatten)]
-    pub(super) model: ModelArgs,
-    #[command(flatten)]
-    pub(super) common: Common,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum Imprints {
-    Measured,
-    Predicted,
-    Both,
+    pub(super) recipe: RecipeArgs,
 }
 
 /// Largest angle and shift of a pose that is named: whole turns and a meter say a unit is wrong.
@@ -69,10 +54,7 @@ pub(in crate::headless) fn parse_start(text: &str) -> Result<PlanarPose, String>
 impl PoseArgs {
     /// The recipe of the predicted imprints if they are asked for, else of the measured ones; with the first registration.
     pub(in crate::headless) fn recipe(&self, rig: &Rig) -> anyhow::Result<Recipe> {
-        let imprint = match self.imprint {
-            Imprints::Measured => ImprintSource::Measured,
-            Imprints::Predicted | Imprints::Both => ImprintSource::Predicted,
-        };
-        self.model.posed(imprint, rig, &self.mask, self.registration.all()?[0])
+        let imprint = self.imprint.farthest();
+        self.recipe.model.posed(imprint, rig, &self.recipe.mask, self.recipe.registration.all()?[0])
     }
 }

@@ -7,9 +7,9 @@ use std::rc::Rc;
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
-use super::super::args::keyed;
+use super::super::args::{RegistrationArgs, keyed};
+use super::super::contact_mask::MaskArgs;
 use touch2touch_core::diffusion::{Sampler, Spacing};
-use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_pipeline::infer::engine::EngineChoice;
 use touch2touch_pipeline::steps::bundles::{self, BundleKind, FoundBundles};
 use touch2touch_pipeline::steps::recipe::ShiftChoice;
@@ -50,6 +50,17 @@ pub struct ModelArgs {
     pub(super) found: Rc<OnceCell<FoundBundles>>,
 }
 
+/// The options that decide a result up to the pose.
+#[derive(Debug, Clone, Args)]
+pub(in crate::headless) struct RecipeArgs {
+    #[command(flatten)]
+    pub(in crate::headless) mask: MaskArgs,
+    #[command(flatten)]
+    pub(in crate::headless) registration: RegistrationArgs,
+    #[command(flatten)]
+    pub(in crate::headless) model: ModelArgs,
+}
+
 impl ModelArgs {
     /// Arguments with another generator, named by its folder, or as it calls itself.
     pub(in crate::headless) fn with_generator(&self, name: &str) -> Self {
@@ -73,14 +84,7 @@ pub(in crate::headless) struct MappingArgs {
     /// shift), `raw` (as the lab's released script saves it), or `refit:FILE` (the paper's shift by the statistics that
     /// `touch2touch stats` wrote with the same bundle).
     #[arg(long, value_name = "SHIFT", default_value = "exact")]
-    pub(super) shift: ShiftChoice,
-}
-
-impl MappingArgs {
-    /// The shift; `bundle` is the generator's name and identity, or `None` where there are several.
-    pub(in crate::headless) fn mode(&self, bundle: Option<(&str, &str)>) -> anyhow::Result<ShiftMode> {
-        Ok(self.shift.mode(bundle)?)
-    }
+    pub(in crate::headless) shift: ShiftChoice,
 }
 
 /// The engine that runs the models, as the command line says it.

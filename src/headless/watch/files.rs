@@ -15,18 +15,9 @@ use touch2touch_pipeline::io::{atomic, files, images, names, npz};
 use touch2touch_pipeline::steps::mask::Contact;
 
 /// File of a touch when it was done: with the same numbers and the same recipe it need not be done again.
-#[derive(Debug, Clone, Serialize)]
-pub(super) struct Source {
-    file: String,
-    bytes: u64,
-    modified_ns: u64,
-}
-
-impl Source {
-    pub(super) fn new(file: &Path, stamp: Stamp) -> Self {
-        let name = file.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-        Self { file: name, bytes: stamp.bytes, modified_ns: stamp.modified_ns() }
-    }
+pub(super) fn source(file: &Path, stamp: Stamp) -> Value {
+    let name = file.file_name().map(|name| name.to_string_lossy());
+    json!({"file": name, "bytes": stamp.bytes, "modified_ns": stamp.modified_ns()})
 }
 
 /// `stem` with the mark of an output and an ending.
@@ -35,10 +26,10 @@ fn output(stem: &Path, ending: &str) -> PathBuf {
 }
 
 /// True where the touch was done before: same file, same recipe, no error.
-pub(super) fn is_done(stem: &Path, source: &Source, recipe: &Value) -> bool {
+pub(super) fn is_done(stem: &Path, source: &Value, recipe: &Value) -> bool {
     let Ok(text) = files::read(&output(stem, "json"), files::SMALL) else { return false };
     let Ok(before) = serde_json::from_slice::<Value>(&text) else { return false };
-    before["error"].is_null() && before["source"] == json!(source) && before["recipe"] == *recipe
+    before["error"].is_null() && before["source"] == *source && before["recipe"] == *recipe
 }
 
 /// Writes imprints (meters, height x width) and masks as one `.npz`, and a 16-bit picture of each imprint (0.001 mm steps
@@ -63,13 +54,11 @@ pub(super) fn predictions(stem: &Path, rig: &Rig, contact: &Contact) -> anyhow::
 
 /// Writes the JSON of a result.
 pub(super) fn result(stem: &Path, value: &impl Serialize) -> anyhow::Result<()> {
-    let file = output(stem, "json");
-    atomic::write_bytes(&file, &serde_json::to_vec_pretty(value)?)
-        .map_err(|err| anyhow::anyhow!("cannot write the result: {err}: {}", file.display()))
+    Ok(atomic::write_json(&output(stem, "json"), "cannot write the result", value)?)
 }
 
 /// Writes the JSON that says why there is no result.
-pub(super) fn failure(stem: &Path, source: &Source, recipe: &Value, problem: &Problem) -> anyhow::Result<()> {
+pub(super) fn failure(stem: &Path, source: &Value, recipe: &Value, problem: &Problem) -> anyhow::Result<()> {
     let value = json!({"source": source, "recipe": recipe, "error": {"what": problem.what, "hint": problem.hint}});
     result(stem, &value)
 }

@@ -11,16 +11,15 @@ use serde_json::{Value, json};
 
 use super::super::output::says;
 use super::super::recipe::{misgiving, warm_up};
-use super::{Latency, Source, WatchArgs, files};
+use super::{Latency, WatchArgs, files};
 use touch2touch_core::contact::ContactMask;
 use touch2touch_core::dataset::Problem;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::{DepthMap, Mask};
 use touch2touch_core::pose::ToolModel;
 use touch2touch_core::postprocess::{ShiftMode, Stats};
-use touch2touch_core::rig::{PadId, Rig, Text};
+use touch2touch_core::rig::{PadId, Rig};
 use touch2touch_core::sample::Sample;
-use touch2touch_core::verdict::Verdict;
 use touch2touch_pipeline::compare;
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::follow::Ready;
@@ -46,39 +45,28 @@ pub(super) struct Arrived<'a> {
     pub(super) begun: (SystemTime, Instant),
     /// Path of its results, without an ending.
     pub(super) stem: &'a Path,
-    pub(super) source: &'a Source,
+    pub(super) source: &'a Value,
     pub(super) recipe: &'a Value,
 }
 
 /// The models, loaded once, and the tools met so far.
-pub(super) struct Worker<'a> {
-    args: &'a WatchArgs,
+pub(super) struct Worker {
     recipe: Recipe,
-    models: Models,
+    pub(super) models: Models,
     tools: BTreeMap<String, Arc<ToolModel>>,
     stop: Cancel,
     /// Seconds that loading and the first run took.
     pub warm_s: f64,
 }
 
-impl<'a> Worker<'a> {
+impl Worker {
     /// Loads the models and runs them once, so that the first touch does not wait for memory and kernels.
-    pub(super) fn new(args: &'a WatchArgs, rig: &Rig, stop: Cancel) -> anyhow::Result<Self> {
-        let recipe = args.model.posed(ImprintSource::Predicted, rig, &args.mask, args.registration.one()?)?;
-        let (models, start) = (args.model.models(), Instant::now());
+    pub(super) fn new(args: &WatchArgs, rig: &Rig, stop: Cancel) -> anyhow::Result<Self> {
+        let recipe = args.recipe.of(ImprintSource::Predicted, rig)?;
+        let (models, start) = (args.recipe.model.models(), Instant::now());
         warm_up(&recipe, &models)?;
         let warm_s = start.elapsed().as_secs_f64();
-        Ok(Self { args, recipe, models, tools: BTreeMap::new(), stop, warm_s })
-    }
-
-    /// After a bug: the models are loaded anew for the next touch.
-    pub(super) fn recover(&self) {
-        self.models.forget();
-    }
-
-    /// The tool of a touch: what the command line says, else what the file's name says.
-    pub(super) fn tool_name(&self, of_pair: Option<String>) -> Option<String> {
-        self.args.tool.clone().or(of_pair)
+        Ok(Self { recipe, models, tools: BTreeMap::new(), stop, warm_s })
     }
 
     /// Everything the result depends on besides the touch.
@@ -110,10 +98,14 @@ impl<'a> Worker<'a> {
         let generate = ms();
         let estimate = estimate.reach(touch, Stage::Pose, &self.models, &cx)?;
         // Without a tool, that is the reason, whatever else is missing.
-        let (pose, no_pose) = match (tool, touch.tool.and(estimate.pose())) {
-            (Some(name), Ok(found)) => (Some(PoseMetrics::new(name, found)), None),
-            (_, Err(err)) => (None, Some(err.why.clone())),
-            (None, Ok(_)) => (None, None),
+        let (pose, no_pose, said) = match (tool, touch.tool.and(estimate.pose())) {
+            (Some(name), Ok(found)) => {
+                let PlanarPose { y_m, z_m, .. } = found.object_from_grasp();
+                let (angle, y, z) = (found.angle_rad.to_degrees(), y_m * 1e3, z_m * 1e3);
+                (Some(posed(name, found)), None, format!("{angle:.1} deg, y {y:.2} mm, z {z:.2} mm"))
+            }
+            (_, Err(err)) => (None, Some(err.why.clone()), format!("no pose: {}", err.why)),
+            (None, Ok(_)) => (None, None, "no pose".to_owned()),
         };
         let (contact, shift) = (estimate.contact(), self.recipe.shift);
         let files = files::predictions(stem, &sample.rig, contact)?;
@@ -135,6 +127,7 @@ impl<'a> Worker<'a> {
                 .collect(),
             pose,
             no_pose,
+            said,
             latency: latency(),
             error: None,
             fresh: ready.fresh,
@@ -177,60 +170,22 @@ fn digest(mask: &Mask) -> String {
     format!("{:016x}", hasher.finish())
 }
 
-/// Metrics of one finger.
-#[derive(Debug, Clone, Serialize)]
-pub(super) struct FingerFigures {
-    pub(super) finger: Text,
-    pub(super) min_m: f64,
-    pub(super) max_m: f64,
-    pub(super) mean_m: f64,
-    pub(super) contact_px: Option<usize>,
-    /// Basis of the mask: the source's key, `depth` where the mask model found nothing, `flat` where there is no
-    /// contact.
-    pub(super) mask: &'static str,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) psnr_db: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) ssim: Option<f64>,
-}
-
-/// A pose, in the lab's sense of the angle.
-#[derive(Debug, Clone, Serialize)]
-pub(super) struct PoseMetrics {
-    pub(super) tool: String,
-    pub(super) angle_deg: f64,
-    pub(super) y_m: f64,
-    pub(super) z_m: f64,
-    pub(super) grasp_from_object: PlanarPose,
-    /// Standard deviation of the angle, and the covariance of `grasp_from_object` (angle in radians, y and z in meters).
-    pub(super) angle_sd_deg: Option<f64>,
-    pub(super) covariance: Option<[[f64; 3]; 3]>,
-    /// Reliance that the pose deserves, without the truth.
-    pub(super) verdict: Option<Verdict>,
-    pub(super) rms_m: f64,
-    pub(super) points: usize,
-    pub(super) stop: String,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) truth_deg: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) error_deg: Option<f64>,
-}
-
 /// A result, as it is written and said.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct Done {
     pub(super) name: String,
-    pub(super) source: Source,
+    pub(super) source: Value,
     pub(super) recipe: Value,
     pub(super) files: Vec<String>,
     /// Oddities of the touch's files.
     pub(super) notes: Vec<Problem>,
     pub(super) scale: &'static str,
-    pub(super) fingers: Vec<FingerFigures>,
+    /// Metrics of each finger's prediction, against the measurement where there is one.
+    pub(super) fingers: Vec<Value>,
     /// Why masks are not made of the source that was asked.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(super) mask_notes: Vec<String>,
-    pub(super) pose: Option<PoseMetrics>,
+    pub(super) pose: Option<Value>,
     /// Why there is no pose.
     pub(super) no_pose: Option<String>,
     /// Up to the writing of this very file; the event and the summary include it.
@@ -238,73 +193,59 @@ pub(super) struct Done {
     pub(super) error: Option<String>,
     #[serde(skip)]
     pub(super) fresh: bool,
+    /// The pose for people.
+    #[serde(skip)]
+    pub(super) said: String,
 }
 
 impl Done {
     pub(super) fn text(&self) -> String {
-        let pose = match (&self.pose, &self.no_pose) {
-            (Some(p), _) => format!("{:.1} deg, y {:.2} mm, z {:.2} mm", p.angle_deg, p.y_m * 1e3, p.z_m * 1e3),
-            (None, Some(why)) => format!("no pose: {why}"),
-            (None, None) => "no pose".to_owned(),
-        };
         let Latency { generate, total, .. } = self.latency;
         let when =
             if self.fresh { format!("{total:.0} ms after it was closed") } else { "was already there".to_owned() };
-        format!("{}: {pose} ({when}; generator {generate:.0} ms)", self.name)
+        format!("{}: {} ({when}; generator {generate:.0} ms)", self.name, self.said)
     }
 }
 
 /// Numbers of one prediction, against the measurement where there is one.
-pub(super) fn figures(
+fn figures(
     sample: &Sample,
     pad: PadId,
     contact: &Contact,
     drawn: Option<(&Prediction, ShiftMode)>,
     tile: Option<&DepthMap>,
-) -> Option<FingerFigures> {
+) -> Option<Value> {
     let imprint = contact.imprints[pad].as_ref()?;
     let stats = Stats::of(imprint);
     let compared = compare::of_pad(imprint, drawn, sample, pad, tile).ok().flatten();
     let mask = contact.masks[pad].as_ref();
     let count = |found: &ContactMask| found.mask.as_slice().iter().filter(|&&m| m).count();
-    Some(FingerFigures {
-        finger: sample.rig.pad_key(pad),
-        min_m: stats.min,
-        max_m: stats.max,
-        mean_m: stats.mean,
-        contact_px: mask.map(count),
-        mask: mask.map_or(contact.source().key(), |found| found.basis.key(contact.source().key())),
-        psnr_db: compared.as_ref().and_then(|c| c.psnr_db),
-        ssim: compared.as_ref().and_then(|c| c.ssim),
-    })
+    // The basis of the mask: the source's key, `depth` where the mask model found nothing, `flat` without contact.
+    let source = contact.source().key();
+    Some(json!({
+        "finger": sample.rig.pad_key(pad), "min_m": stats.min, "max_m": stats.max, "mean_m": stats.mean,
+        "contact_px": mask.map(count), "mask": mask.map_or(source, |found| found.basis.key(source)),
+        "psnr_db": compared.as_ref().and_then(|c| c.psnr_db), "ssim": compared.as_ref().and_then(|c| c.ssim),
+    }))
 }
 
-impl PoseMetrics {
-    fn new(tool: &str, found: &PoseResult) -> Self {
-        let place = found.object_from_grasp();
-        Self {
-            tool: tool.to_owned(),
-            angle_deg: found.angle_rad.to_degrees(),
-            y_m: place.y_m,
-            z_m: place.z_m,
-            grasp_from_object: found.grasp_from_object,
-            angle_sd_deg: found.angle_sd_rad().map(f64::to_degrees),
-            covariance: found.report.evidence.map(|evidence| evidence.uncertainty.covariance),
-            verdict: found.verdict.clone(),
-            rms_m: found.rms_m,
-            points: found.num_points,
-            stop: found.stop.clone(),
-            truth_deg: found.truth_rad.map(f64::to_degrees),
-            error_deg: found.error_rad.map(f64::to_degrees),
-        }
-    }
+/// A pose, in the lab's sense of the angle; the covariance is that of `grasp_from_object`: radians and meters.
+fn posed(tool: &str, found: &PoseResult) -> Value {
+    let place = found.object_from_grasp();
+    json!({
+        "tool": tool, "angle_deg": found.angle_rad.to_degrees(), "y_m": place.y_m, "z_m": place.z_m,
+        "grasp_from_object": found.grasp_from_object, "angle_sd_deg": found.angle_sd_rad().map(f64::to_degrees),
+        "covariance": found.report.evidence.map(|evidence| evidence.uncertainty.covariance),
+        "verdict": found.verdict, "rms_m": found.rms_m, "points": found.num_points, "stop": found.stop,
+        "truth_deg": found.truth_rad.map(f64::to_degrees), "error_deg": found.error_rad.map(f64::to_degrees),
+    })
 }
 
 /// The CAD model of a tool: a file, one of the data set's, or one of the demo's.
 fn tool_model(dataset: &Dataset, name: &str) -> anyhow::Result<ToolModel> {
     if Path::new(name).extension().is_some_and(|e| e.eq_ignore_ascii_case("stl")) {
         let mesh = read_in_meters(Path::new(name), None);
-        let mesh = mesh.map_err(|err| anyhow::anyhow!("{err}: {}", err.hint()))?;
+        let mesh = mesh.map_err(|err| anyhow::anyhow!("{err}: {}", err.hint))?;
         return Ok(named_tool(name, mesh)?.model);
     }
     let demo = Dataset::demo();

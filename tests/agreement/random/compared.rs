@@ -2,17 +2,16 @@
 
 use proptest::option;
 use proptest::prelude::*;
-use strum::IntoEnumIterator as _;
 use touch2touch::app::results;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{CompareChoice, CompareMode};
 use touch2touch_pipeline::compare::Comparison;
-use touch2touch_pipeline::compare::subject::{Mapping, RecipeChange, Subject};
+use touch2touch_pipeline::compare::subject::{RecipeChange, SHIFTS, Subject};
 
 use super::*;
 
 fn change() -> impl Strategy<Value = RecipeChange> {
-    let shift = proptest::sample::select(Mapping::iter().collect::<Vec<_>>());
+    let shift = proptest::sample::select(SHIFTS.map(|(_, mode)| mode).to_vec());
     (option::of(1..=2u32), option::of(any::<u64>()), option::of(shift)).prop_map(|(steps, seed, shift)| RecipeChange {
         bundle: None,
         steps,

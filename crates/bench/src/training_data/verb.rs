@@ -7,7 +7,7 @@ use clap::Args;
 use serde::Serialize;
 
 use super::{ShardSetup, TouchSource, WrittenShards, write_shards};
-use touch2touch::headless::{Common, DatasetArgs, LimitArgs, Output, VerbResult, at_least_one, condition, keyed};
+use touch2touch::headless::{DatasetArgs, LimitArgs, VerbResult, at_least_one, condition, keyed};
 use touch2touch_bench::training_mix::Mix;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::sim::Condition;
@@ -46,8 +46,6 @@ pub(crate) struct TrainingDataArgs {
     seed: u64,
     #[command(flatten)]
     limit: LimitArgs,
-    #[command(flatten)]
-    common: Common,
 }
 
 fn parse_share(text: &str) -> Result<[usize; 2], String> {
@@ -68,7 +66,7 @@ pub(crate) fn run(args: &TrainingDataArgs) -> VerbResult {
     let begin = Instant::now();
     let setup = ShardSetup { pairs_per_shard: args.per_shard, share: args.shard };
     let (written, output) = if args.dataset.path() == Path::new(SIMULATOR) {
-        let output = Output::new(args.common, "simulating", args.grasps);
+        let output = args.dataset.output("simulating", args.grasps);
         let TrainingDataArgs { grasps, mix, condition, seed, .. } = *args;
         let source = TouchSource::Simulator { grasps, mix, condition, seed };
         (write_shards(source, setup, &args.out, &output.job())?, output)
@@ -76,7 +74,7 @@ pub(crate) fn run(args: &TrainingDataArgs) -> VerbResult {
         let dataset = args.dataset.open()?;
         let ids = args.limit.spread(dataset.index.pairs.len());
         let pairs: Vec<PairId> = ids.into_iter().map(|id| PairId(id as u32)).collect();
-        let output = Output::new(args.common, "writing", pairs.len());
+        let output = args.dataset.output("writing", pairs.len());
         let source = TouchSource::Dataset(&dataset, &Labels::of(&dataset), &pairs);
         (write_shards(source, setup, &args.out, &output.job())?, output)
     };

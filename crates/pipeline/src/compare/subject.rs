@@ -39,7 +39,7 @@ pub struct RecipeChange {
     /// Seed of the noise.
     pub seed: Option<u64>,
     /// Mapping to meters.
-    pub shift: Option<Mapping>,
+    pub shift: Option<ShiftMode>,
 }
 
 /// Origin of a subject's imprint.
@@ -67,45 +67,19 @@ impl RecipeChange {
             config.steps = self.steps.unwrap_or(config.steps);
             config.seed = self.seed.unwrap_or(config.seed);
         }
-        recipe.shift = self.shift.map_or(recipe.shift, Mapping::mode);
+        recipe.shift = self.shift.unwrap_or(recipe.shift);
         Ok(recipe)
     }
 }
 
-/// A way to meters that needs no statistics of a data set.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, strum::EnumIter)]
-pub enum Mapping {
-    /// The exact inverse, with the fit of a fitted bundle.
-    Exact,
-    /// The exact inverse without the fit.
-    Unfitted,
-    /// The paper's shift.
-    Paper,
-    /// As the released script saves it.
-    Raw,
-}
-
-impl Mapping {
-    /// The mode it stands for.
-    pub fn mode(self) -> ShiftMode {
-        match self {
-            Self::Exact => ShiftMode::ExactInverse,
-            Self::Unfitted => ShiftMode::Parts(CorrectionParts::NONE),
-            Self::Paper => ShiftMode::PaperShift,
-            Self::Raw => ShiftMode::Raw,
-        }
-    }
-
-    /// Name in text.
-    pub fn key(self) -> &'static str {
-        match self {
-            Self::Exact => "exact",
-            Self::Unfitted => "unfitted",
-            Self::Paper => "paper",
-            Self::Raw => "raw",
-        }
-    }
-}
+/// The ways to meters that need no statistics of a data set, by their names: the exact inverse with and without the fit of a
+/// fitted bundle, the paper's shift, and as the released script saves it.
+pub const SHIFTS: [(&str, ShiftMode); 4] = [
+    ("exact", ShiftMode::ExactInverse),
+    ("unfitted", ShiftMode::Parts(CorrectionParts::NONE)),
+    ("paper", ShiftMode::PaperShift),
+    ("raw", ShiftMode::Raw),
+];
 
 impl Subject {
     /// The prediction that the settings make.
@@ -149,7 +123,7 @@ impl Subject {
             change.bundle,
             change.seed.map(|seed| format!("seed {seed}")),
             change.steps.map(|steps| format!("{steps} steps")),
-            change.shift.map(|shift| shift.mode().label().to_lowercase()),
+            change.shift.map(|shift| shift.label().to_lowercase()),
         ];
         parts.into_iter().flatten().collect::<Vec<_>>().join(" · ")
     }
@@ -164,12 +138,13 @@ impl std::fmt::Display for Subject {
             Self::Mean(_, seeds) => ("mean", Some(format!("seeds={seeds}"))),
         };
         let change = self.change().cloned().unwrap_or_default();
+        let shift = SHIFTS.iter().find(|(_, mode)| change.shift == Some(*mode));
         let parts = [
             seeds,
             change.bundle.map(|bundle| format!("bundle={}", quoted(bundle))),
             change.seed.map(|seed| format!("seed={seed}")),
             change.steps.map(|steps| format!("steps={steps}")),
-            change.shift.map(|shift| format!("shift={}", shift.key())),
+            shift.map(|(name, _)| format!("shift={name}")),
         ];
         let parts: Vec<String> = parts.into_iter().flatten().collect();
         let colon = if parts.is_empty() { "" } else { ":" };
@@ -181,7 +156,6 @@ impl FromStr for Subject {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        use strum::IntoEnumIterator as _;
         let (name, rest) = text.split_once(':').unwrap_or((text, ""));
         let (mut change, mut seeds) = (RecipeChange::default(), None);
         for part in parts(rest).map(str::trim).filter(|part| !part.is_empty()) {
@@ -196,7 +170,7 @@ impl FromStr for Subject {
                 "steps" => {
                     change.steps = Some(value.parse().ok().filter(|n| (1..=1000).contains(n)).ok_or_else(wrong)?)
                 }
-                "shift" => change.shift = Some(Mapping::iter().find(|m| m.key() == value).ok_or_else(wrong)?),
+                "shift" => change.shift = Some(SHIFTS.iter().find(|(name, _)| *name == value).ok_or_else(wrong)?.1),
                 "seeds" => seeds = Some(value.parse().ok().filter(|n| SEEDS.contains(n)).ok_or_else(wrong)?),
                 _ => return Err(format!("{key} is none of bundle, seed, steps, shift, seeds")),
             }

@@ -9,7 +9,8 @@ use serde::Serialize;
 use crate::error::{Remark, TaskError};
 use crate::io::catch_panic::catch_panic;
 use crate::io::dataset::Dataset;
-use crate::io::exchange::{self, ExportEntry, Format, Listed, ReadError, Stems};
+use crate::io::error::FileError;
+use crate::io::exchange::{self, ExportEntry, Format, Listed, Stems};
 use crate::job::JobCx;
 use crate::labels::{DrawnMask, Labels, MaskPlace, Operation, PairLabels};
 use crate::steps::imprint::measured;
@@ -119,7 +120,7 @@ pub fn import_masks(dataset: &Dataset, setup: &ImportSetup, cx: &JobCx) -> Resul
 }
 
 fn go(dataset: &Dataset, setup: &ImportSetup, write: bool, cx: &JobCx) -> Result<Import, TaskError> {
-    let fail = |err: ReadError| TaskError::from_error(WHAT, &err).with_hint(err.hint);
+    let fail = |err: FileError| TaskError::from_error(WHAT, &err).with_hint(err.hint);
     let listing = exchange::list(&setup.from, setup.format).map_err(fail)?;
     let labels = Labels::of(dataset);
     let folder = match labels.folder() {
@@ -252,8 +253,8 @@ impl ImportRun<'_> {
         stored: &mut PairLabels,
         judged: bool,
         counts: &mut Import,
-    ) -> Result<bool, ReadError> {
-        let refuse = |what: String| ReadError { file: listed.file.clone(), what, hint: "" };
+    ) -> Result<bool, FileError> {
+        let refuse = |what: String| FileError::new(&listed.file, what, "");
         let size = imprint.ok_or_else(|| refuse("the finger has no measured imprint".into()))?.size();
         let (mask, ignored) = listed.read()?;
         for one in std::iter::once(&mask).chain(&ignored) {

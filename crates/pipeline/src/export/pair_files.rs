@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use glam::DAffine3;
-use serde::Serialize;
+use serde_json::json;
 
 use crate::error::TaskError;
 use crate::io::names::{OUTPUT_MARK, output};
@@ -18,7 +18,6 @@ use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::pose::{Registration, ToolModel};
 use touch2touch_core::rig::Rig;
 use touch2touch_core::units::{angle_error, mm};
-use touch2touch_core::verdict::Verdict;
 
 const WHAT: &str = "Export the pair";
 
@@ -50,54 +49,6 @@ pub struct PairParts<'a> {
 /// Rows of a 4 x 4 matrix that takes columns `(x, y, z, 1)`.
 type Matrix = [[f64; 4]; 4];
 
-#[derive(Debug, Serialize)]
-struct PoseFile<'a> {
-    pair: &'a str,
-    imprint: &'static str,
-    /// Origin of the prediction; none of a measured imprint.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    prediction: Option<&'a str>,
-    tool: Option<&'a str>,
-    #[serde(rename = "engine")]
-    registration: String,
-    mask: &'a str,
-    convention: &'static str,
-    grasp_from_object: Matrix,
-    object_from_grasp: Matrix,
-    #[serde(flatten)]
-    numbers: Numbers,
-    truth: Option<Truth>,
-    /// Standard deviation of the angle, and the covariance of `grasp_from_object`: angle (radians), y and z (meters).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    angle_sd_deg: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    covariance: Option<[[f64; 3]; 3]>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    verdict: Option<&'a Verdict>,
-    rms_mm: f64,
-    contact_points: usize,
-    converged: bool,
-    stop: &'a str,
-}
-
-/// A planar pose, of `object_from_grasp`: its angle is the number that the lab reports.
-#[derive(Debug, Serialize)]
-struct Numbers {
-    theta_deg: f64,
-    y_mm: f64,
-    z_mm: f64,
-}
-
-#[derive(Debug, Serialize)]
-struct Truth {
-    grasp_from_object: Matrix,
-    #[serde(flatten)]
-    numbers: Numbers,
-    error_deg: f64,
-    /// Between the origins of the object's frame, in the grasp frame.
-    error_mm: f64,
-}
-
 const CONVENTION: &str = "grasp_from_object moves points of the CAD model (meters) into the grasp frame: x is the closing \
                           axis, +z where the tool points, y lateral. Matrices are given row by row and take columns \
                           (x, y, z, 1). theta_deg, y_mm and z_mm are those of object_from_grasp, about +x from y towards z, \
@@ -107,11 +58,6 @@ fn matrix(motion: DAffine3) -> Matrix {
     let columns = glam::DMat4::from(motion).transpose().to_cols_array_2d();
     // No minus before a zero.
     columns.map(|row| row.map(|v| v + 0.0))
-}
-
-fn numbers(grasp_from_object: PlanarPose) -> Numbers {
-    let pose = grasp_from_object.inverse();
-    Numbers { theta_deg: pose.theta_rad.to_degrees(), y_mm: mm(pose.y_m), z_mm: mm(pose.z_m) }
 }
 
 /// Writes the surface points of a pair (PLY, with contact, finger and distance to the model) and, where there is one, its
@@ -173,33 +119,26 @@ fn points(parts: &PairParts<'_>) -> Vec<PlyPoint> {
 }
 
 fn pose_json(parts: &PairParts<'_>, pose: &PoseResult) -> serde_json::Result<String> {
-    let found = pose.grasp_from_object;
-    let truth = parts.truth.map(|truth| Truth {
-        grasp_from_object: matrix(pose.grasp_from_cad_at(truth)),
-        numbers: numbers(truth),
-        error_deg: angle_error(found.theta_rad, truth.theta_rad).to_degrees(),
-        error_mm: mm((found.y_m - truth.y_m).hypot(found.z_m - truth.z_m)),
+    let (found, back) = (pose.grasp_from_object, pose.object_from_grasp());
+    let truth = parts.truth.map(|truth| {
+        let back = truth.inverse();
+        json!({
+            "grasp_from_object": matrix(pose.grasp_from_cad_at(truth)),
+            "theta_deg": back.theta_rad.to_degrees(), "y_mm": mm(back.y_m), "z_mm": mm(back.z_m),
+            "error_deg": angle_error(found.theta_rad, truth.theta_rad).to_degrees(),
+            "error_mm": mm((found.y_m - truth.y_m).hypot(found.z_m - truth.z_m)),
+        })
     });
-    serde_json::to_string_pretty(&PoseFile {
-        pair: parts.name,
-        imprint: parts.source.key(),
-        prediction: parts.prediction,
-        tool: parts.tool.map(|(name, _)| name),
-        registration: parts.registration.to_string(),
-        mask: parts.mask,
-        convention: CONVENTION,
-        grasp_from_object: matrix(pose.grasp_from_cad()),
-        object_from_grasp: matrix(pose.grasp_from_cad().inverse()),
-        numbers: numbers(found),
-        truth,
-        angle_sd_deg: pose.angle_sd_rad().map(f64::to_degrees),
-        covariance: pose.report.evidence.map(|evidence| evidence.uncertainty.covariance),
-        verdict: pose.verdict.as_ref(),
-        rms_mm: mm(pose.rms_m),
-        contact_points: pose.num_points,
-        converged: pose.converged,
-        stop: &pose.stop,
-    })
+    serde_json::to_string_pretty(&json!({
+        "pair": parts.name, "imprint": parts.source, "prediction": parts.prediction,
+        "tool": parts.tool.map(|(name, _)| name), "engine": parts.registration.to_string(), "mask": parts.mask,
+        "convention": CONVENTION, "grasp_from_object": matrix(pose.grasp_from_cad()),
+        "object_from_grasp": matrix(pose.grasp_from_cad().inverse()),
+        "theta_deg": back.theta_rad.to_degrees(), "y_mm": mm(back.y_m), "z_mm": mm(back.z_m), "truth": truth,
+        "angle_sd_deg": pose.angle_sd_rad().map(f64::to_degrees),
+        "covariance": pose.report.evidence.map(|evidence| evidence.uncertainty.covariance), "verdict": pose.verdict,
+        "rms_mm": mm(pose.rms_m), "contact_points": pose.num_points, "converged": pose.converged, "stop": pose.stop,
+    }))
 }
 
 #[cfg(test)]

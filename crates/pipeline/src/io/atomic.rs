@@ -9,6 +9,8 @@ use std::time::Duration;
 
 use tempfile::NamedTempFile;
 
+use super::error::FileError;
+
 /// Start of the name of a temporary file.
 const PREFIX: &str = ".tmp-";
 /// End of the name of a temporary file.
@@ -30,7 +32,7 @@ pub fn write(path: &Path, content: impl FnOnce(&mut File) -> io::Result<()>) -> 
         _ => Path::new("."),
     };
     sweep_once(folder);
-    let mut temporary = temporary(folder)?;
+    let mut temporary = probe(folder)?;
     content(temporary.as_file_mut())?;
     flushed(temporary.as_file().sync_all())?;
     temporary.persist(path).map_err(|err| err.error)?;
@@ -68,15 +70,20 @@ pub fn write_bytes(path: &Path, bytes: &[u8]) -> io::Result<()> {
     write(path, |file| io::Write::write_all(file, bytes))
 }
 
+/// Writes a value as JSON for people to read; `what` failed where it could not be written, as in "cannot write the report".
+///
+/// # Errors
+/// If the disk refuses.
+pub fn write_json(file: &Path, what: &str, value: &impl serde::Serialize) -> Result<(), FileError> {
+    let text = serde_json::to_vec_pretty(value).map_err(io::Error::from);
+    text.and_then(|text| write_bytes(file, &text)).map_err(|err| FileError::io(file, what, err))
+}
+
 /// An empty file in `folder` that is gone when it is dropped: whether the folder can be written, and how it takes names.
 ///
 /// # Errors
 /// Whatever the disk says.
 pub(crate) fn probe(folder: &Path) -> io::Result<NamedTempFile> {
-    temporary(folder)
-}
-
-fn temporary(folder: &Path) -> io::Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(PREFIX).suffix(SUFFIX);
     // Temporary files are private by default; the finished file is an ordinary one.
@@ -168,7 +175,7 @@ mod tests {
         std::fs::write(at(".tmp-left.part"), "half").unwrap();
         std::fs::write(at(".tmp-newborn.part"), "").unwrap();
         std::fs::write(at("notes.part"), "mine").unwrap();
-        let running = temporary(dir.path()).unwrap();
+        let running = probe(dir.path()).unwrap();
         std::fs::write(running.path(), "half").unwrap();
         write_bytes(&at("new"), b"new").unwrap();
         assert!(!at(".tmp-left.part").exists());

@@ -9,6 +9,7 @@
 
 mod built_in;
 mod cad;
+mod colors;
 mod depths;
 mod error;
 mod grow;
@@ -33,10 +34,9 @@ use touch2touch_core::sample::{DepthCamera, Sample};
 use touch2touch_core::turn::Turn;
 
 use super::dataset_location::DatasetLocation;
-use super::stl::MeshError;
+use super::error::{FileError, FileErrorKind};
 
 pub use built_in::BuiltIn;
-pub use error::{LoadError, OpenError};
 pub(crate) use pictures::{ASSUMED_IMPRINT_RANGE_M, assumed_meters, imprint_from_tile};
 pub use read_as::{READ_AS_FILE, write_read_as};
 pub use rig_json::{RIG_JSON, rig_of};
@@ -116,6 +116,12 @@ pub struct Dataset {
     /// Ways in which it is read otherwise than it is stored.
     read_as: Vec<ReadAs>,
     source: Source,
+    /// Of each pair, in the order of the index; none of what is built in.
+    files: Vec<Files>,
+    /// The folders whose content decides which pairs there are.
+    folders: Vec<PathBuf>,
+    /// The CAD models by tool.
+    meshes: BTreeMap<String, PathBuf>,
     /// The depth cameras of the rig, for touches that come without a depth picture; read when first needed.
     cameras: OnceLock<PerPad<Arc<DepthCamera>>>,
     /// The units of CAD models that were named for this run only, by tool.
@@ -124,10 +130,31 @@ pub struct Dataset {
 
 #[derive(Clone, Debug)]
 enum Source {
-    Lab(lab::Lab),
-    Depths(depths::Depths),
-    Pictures(pictures::Pictures),
+    /// `flat`: the touches lie directly in one folder, as a robot may write them.
+    Lab {
+        flat: bool,
+    },
+    Depths,
+    Pictures,
     BuiltIn(BuiltIn),
+}
+
+/// The files of a pair.
+#[derive(Clone, Debug)]
+enum Files {
+    Lab(lab::PairFiles),
+    Row(depths::Row),
+    Pictures(pictures::Touch),
+}
+
+impl Files {
+    fn list(&self) -> Vec<PathBuf> {
+        match self {
+            Self::Lab(lab) => [&lab.gelslim, &lab.bubble].into_iter().flatten().cloned().collect(),
+            Self::Row(row) => vec![row.path().to_owned()],
+            Self::Pictures(touch) => touch.list(),
+        }
+    }
 }
 
 /// Findings of a scan, before they become a [`Dataset`].
@@ -135,6 +162,9 @@ struct Scan {
     root: PathBuf,
     pairs: Vec<PairEntry>,
     problems: Vec<Problem>,
+    files: Vec<Files>,
+    folders: Vec<PathBuf>,
+    meshes: BTreeMap<String, PathBuf>,
     source: Source,
     kind: SourceKind,
     rig: Arc<Rig>,
@@ -148,9 +178,9 @@ impl Dataset {
     /// `path` may be the data set's root, the folder above its `data` folder, any folder inside it, or a file in it.
     ///
     /// # Errors
-    /// [`OpenError`] if nothing can be opened at all; everything smaller is listed in [`Dataset::problems`].
-    pub fn open(path: &Path) -> Result<Self, OpenError> {
-        let io = |source| OpenError::Io { path: path.to_owned(), source };
+    /// [`FileError`] if nothing can be opened at all; everything smaller is listed in [`Dataset::problems`].
+    pub fn open(path: &Path) -> Result<Self, FileError> {
+        let io = |err| error::no_folder(path, err);
         if let Some(built_in) = path.to_str().and_then(BuiltIn::named).filter(|_| !path.exists()) {
             return Ok(Self::built_in(built_in));
         }
@@ -169,10 +199,7 @@ impl Dataset {
                 },
             },
         };
-        let mut scan = found.ok_or_else(|| OpenError::NothingFound {
-            path: path.to_owned(),
-            instead: other::kind(&absolute, &folder),
-        })?;
+        let mut scan = found.ok_or_else(|| error::nothing_found(path, other::kind(&absolute, &folder)))?;
         if scan.kind == SourceKind::Lab && *scan.rig == *Rig::lab() && *rig_of(&scan.root)? != *scan.rig {
             let what = format!("{RIG_JSON} declares other sensors, but .pt files are always read as the lab's");
             scan.problems.push(problem(scan.root.join(RIG_JSON), what, "remove it, or save the touches as pictures"));
@@ -182,20 +209,29 @@ impl Dataset {
     }
 
     fn of(scan: Scan) -> Self {
-        let mut problems = scan.problems;
-        problems.extend(super::simulated::unfinished(&scan.root));
-        let title = scan.root.file_name().map_or_else(|| "dataset".into(), |n| n.to_string_lossy().into_owned());
+        let Scan { root, pairs, mut problems, files, folders, meshes, source, kind, rig } = scan;
+        problems.extend(super::simulated::unfinished(&root));
+        let title = root.file_name().map_or_else(|| "dataset".into(), |n| n.to_string_lossy().into_owned());
+        let (home, root) = (DatasetLocation::at(&root), Some(root));
+        Self { root, home, problems, files, folders, meshes, ..Self::of_pairs(title, kind, pairs, source, rig) }
+    }
+
+    /// Without files.
+    fn of_pairs(title: String, kind: SourceKind, pairs: Vec<PairEntry>, source: Source, rig: Arc<Rig>) -> Self {
         Self {
             title,
-            home: DatasetLocation::at(&scan.root),
-            root: Some(scan.root),
-            kind: scan.kind,
-            index: Index { pairs: scan.pairs },
-            problems,
+            root: None,
+            home: None,
+            kind,
+            index: Index { pairs },
+            problems: Vec::new(),
             tool_scale: None,
-            rig: scan.rig,
+            rig,
             read_as: Vec::new(),
-            source: scan.source,
+            source,
+            files: Vec::new(),
+            folders: Vec::new(),
+            meshes: BTreeMap::new(),
             cameras: OnceLock::new(),
             held_units: Arc::default(),
         }
@@ -208,20 +244,7 @@ impl Dataset {
 
     /// A built-in data set. Nothing is rendered yet.
     pub fn built_in(set: BuiltIn) -> Self {
-        Self {
-            title: set.title(),
-            root: None,
-            home: None,
-            kind: SourceKind::Demo,
-            index: Index { pairs: set.pairs() },
-            problems: Vec::new(),
-            tool_scale: None,
-            rig: Rig::lab(),
-            read_as: Vec::new(),
-            source: Source::BuiltIn(set),
-            cameras: OnceLock::new(),
-            held_units: Arc::default(),
-        }
+        Self::of_pairs(set.title(), SourceKind::Demo, set.pairs(), Source::BuiltIn(set), Rig::lab())
     }
 
     /// Loads a pair. Takes tens of milliseconds: not for the thread that draws.
@@ -230,8 +253,8 @@ impl Dataset {
     /// Oddities of the files and implausible values in them are in the sample's notes.
     ///
     /// # Errors
-    /// [`LoadError`] naming the file, and for tensors the key.
-    pub fn load(&self, id: PairId) -> Result<Sample, LoadError> {
+    /// [`FileError`] naming the file, and for tensors the key.
+    pub fn load(&self, id: PairId) -> Result<Sample, FileError> {
         self.load_with_counts(id).map(|loaded| loaded.sample)
     }
 
@@ -239,27 +262,23 @@ impl Dataset {
     ///
     /// # Errors
     /// As [`Dataset::load`].
-    pub fn load_with_counts(&self, id: PairId) -> Result<Loaded, LoadError> {
+    pub fn load_with_counts(&self, id: PairId) -> Result<Loaded, FileError> {
         if self.index.get(id).is_none() {
-            return Err(LoadError::NoSuchPair { id });
+            return Err(error::no_such_pair(id));
         }
         self.catch_panic(id, || {
-            let mut loaded = match &self.source {
-                Source::Lab(lab) => lab.load(id)?,
-                Source::Depths(depths) => {
-                    let mut loaded = depths.load(id)?;
-                    self.read_otherwise(&mut loaded.sample);
-                    return Ok(loaded);
-                }
-                Source::Pictures(pictures) => pictures.load(id)?,
-                Source::BuiltIn(set) => {
-                    let mut sample = set.load(id).ok_or(LoadError::NoSuchPair { id })?;
-                    self.read_otherwise(&mut sample);
-                    return Ok(Loaded { sample, invalid: Default::default() });
-                }
-            };
+            let mut loaded = match (&self.source, self.files.get(id.0 as usize)) {
+                (Source::BuiltIn(set), _) => set.load(id).map(|sample| Loaded { sample, ..Loaded::default() }),
+                (_, Some(Files::Lab(halves))) => Some(halves.load()?),
+                (_, Some(Files::Row(row))) => Some(row.load(&self.rig)?),
+                (_, Some(Files::Pictures(touch))) => Some(touch.load(&self.rig)?),
+                (_, None) => None,
+            }
+            .ok_or_else(|| error::no_such_pair(id))?;
             self.read_otherwise(&mut loaded.sample);
-            // The bubble's file is the last one.
+            if matches!(self.source, Source::Depths | Source::BuiltIn(_)) {
+                return Ok(loaded);
+            }
             let file = self.pair_files(id).pop().unwrap_or_default();
             plausible::notes(&mut loaded, &file);
             self.lend_cameras(&mut loaded.sample);
@@ -268,16 +287,15 @@ impl Dataset {
     }
 
     /// Reads something of a pair. A panic is that pair's error: no file may end a run over others.
-    fn catch_panic<T>(&self, id: PairId, read: impl FnOnce() -> Result<T, LoadError>) -> Result<T, LoadError> {
-        super::catch_panic::catch_panic(read)
-            .unwrap_or_else(|message| Err(LoadError::Bug { files: self.pair_files(id), message }))
+    fn catch_panic<T>(&self, id: PairId, read: impl FnOnce() -> Result<T, FileError>) -> Result<T, FileError> {
+        super::catch_panic::catch_panic(read).unwrap_or_else(|message| Err(error::bug(&self.pair_files(id), &message)))
     }
 
     /// The tool's CAD model in meters and the object frame; `None` where the data set has none.
     ///
     /// # Errors
-    /// [`MeshError`] if there is a file that cannot be used, or whose size cannot be meters.
-    pub fn tool_mesh(&self, tool: &str) -> Result<Option<TriMesh>, MeshError> {
+    /// [`FileError`] if there is a file that cannot be used, or whose size cannot be meters.
+    pub fn tool_mesh(&self, tool: &str) -> Result<Option<TriMesh>, FileError> {
         Ok(self.tool_with_notes(tool)?.map(|file| file.mesh))
     }
 
@@ -285,11 +303,11 @@ impl Dataset {
     ///
     /// # Errors
     /// As [`Dataset::tool_mesh`].
-    pub(crate) fn tool_with_notes(&self, tool: &str) -> Result<Option<ToolFile>, MeshError> {
+    pub(crate) fn tool_with_notes(&self, tool: &str) -> Result<Option<ToolFile>, FileError> {
         match (self.tool_mesh_file(tool), &self.source) {
             (Some(path), _) => read_tool(path, self.scale_of(tool)).map(Some),
-            (None, Source::Lab(_) | Source::Depths(_)) => Ok(None),
-            (None, Source::Pictures(_) | Source::BuiltIn(_)) => {
+            (None, Source::Lab { .. } | Source::Depths) => Ok(None),
+            (None, Source::Pictures | Source::BuiltIn(_)) => {
                 Ok(built_in::mesh(tool).map(|mesh| ToolFile { mesh, notes: Vec::new() }))
             }
         }
@@ -308,22 +326,12 @@ impl Dataset {
 
     /// The file of the tool's CAD model, if the source has files.
     pub fn tool_mesh_file(&self, tool: &str) -> Option<&Path> {
-        match &self.source {
-            Source::Lab(lab) => lab.meshes.get(tool).map(PathBuf::as_path),
-            Source::Depths(depths) => depths.meshes.get(tool).map(PathBuf::as_path),
-            Source::Pictures(pictures) => pictures.meshes.get(tool).map(PathBuf::as_path),
-            Source::BuiltIn(_) => None,
-        }
+        self.meshes.get(tool).map(PathBuf::as_path)
     }
 
     /// The files of a pair (GelSlim, then bubble), as far as they exist.
     pub fn pair_files(&self, id: PairId) -> Vec<PathBuf> {
-        match &self.source {
-            Source::Lab(lab) => lab.files(id),
-            Source::Depths(depths) => depths.files(id),
-            Source::Pictures(pictures) => pictures.files(id),
-            Source::BuiltIn(_) => Vec::new(),
-        }
+        self.files.get(id.0 as usize).map_or_else(Vec::new, Files::list)
     }
 
     /// The bubble picture on its own pixels (0..255, rotated by 180 degrees), laid upright from how the pair's pictures lay
@@ -331,14 +339,12 @@ impl Dataset {
     ///
     /// # Errors
     /// As [`Dataset::load`].
-    pub fn bubble_tile(&self, id: PairId, laid: Turn) -> Result<Option<Grid<f32>>, LoadError> {
-        match &self.source {
-            Source::Pictures(pictures) => self.catch_panic(id, || {
-                let tile = pictures.tile(id, pictures::BUBBLE, laid)?;
-                Ok(tile.map(|tile| self.lays().fold(tile, |tile, lay| lay.apply(&tile))))
-            }),
-            Source::Lab(_) | Source::Depths(_) | Source::BuiltIn(_) => Ok(None),
-        }
+    pub fn bubble_tile(&self, id: PairId, laid: Turn) -> Result<Option<Grid<f32>>, FileError> {
+        let Some(Files::Pictures(touch)) = self.files.get(id.0 as usize) else { return Ok(None) };
+        self.catch_panic(id, || {
+            let tile = touch.tile(&self.rig, pictures::BUBBLE, laid)?;
+            Ok(tile.map(|tile| self.lays().fold(tile, |tile, lay| lay.apply(&tile))))
+        })
     }
 
     /// The lab's own VQ-VAE prediction for the pair, from the file `NAME_vqvae.png`, as [`Dataset::bubble_tile`]; `None`
@@ -346,29 +352,25 @@ impl Dataset {
     ///
     /// # Errors
     /// As [`Dataset::load`].
-    pub fn vqvae_tile(&self, id: PairId, laid: Turn) -> Result<Option<Grid<f32>>, LoadError> {
-        match &self.source {
-            Source::Pictures(pictures) => self.catch_panic(id, || pictures.tile(id, pictures::VQVAE, laid)),
-            Source::Lab(_) | Source::Depths(_) | Source::BuiltIn(_) => Ok(None),
-        }
+    pub fn vqvae_tile(&self, id: PairId, laid: Turn) -> Result<Option<Grid<f32>>, FileError> {
+        let Some(Files::Pictures(touch)) = self.files.get(id.0 as usize) else { return Ok(None) };
+        self.catch_panic(id, || touch.tile(&self.rig, pictures::VQVAE, laid))
     }
 
     /// True where the GelSlim picture of a pair was cut off at black or white; `None` for other sources.
     ///
     /// # Errors
     /// As [`Dataset::load`].
-    pub fn gelslim_is_clipped(&self, id: PairId) -> Result<Option<bool>, LoadError> {
-        match &self.source {
-            Source::Pictures(pictures) => self.catch_panic(id, || pictures.is_clipped(id)),
-            Source::Lab(_) | Source::Depths(_) | Source::BuiltIn(_) => Ok(None),
-        }
+    pub fn gelslim_is_clipped(&self, id: PairId) -> Result<Option<bool>, FileError> {
+        let Some(Files::Pictures(touch)) = self.files.get(id.0 as usize) else { return Ok(None) };
+        self.catch_panic(id, || touch.is_clipped())
     }
 
     /// [`Dataset::vqvae_tile`] brought to meters, raw orientation and 175 x 140 px, as the measured imprint is.
     ///
     /// # Errors
     /// As [`Dataset::load`].
-    pub fn vqvae_imprint(&self, id: PairId, laid: Turn) -> Result<Option<DepthMap>, LoadError> {
+    pub fn vqvae_imprint(&self, id: PairId, laid: Turn) -> Result<Option<DepthMap>, FileError> {
         Ok(self.vqvae_tile(id, laid)?.map(|tile| pictures::imprint_from_tile(&tile, &self.rig)))
     }
 }
@@ -383,10 +385,14 @@ fn last_integer(text: &str) -> u64 {
 }
 
 /// Refuses an image of which more than half (`bad` of `all`) is no measurement; `what` names it.
-fn most_invalid(file: &Path, bad: usize, all: usize, what: impl FnOnce() -> String) -> Result<(), LoadError> {
+fn most_invalid(file: &Path, bad: usize, all: usize, what: impl FnOnce() -> String) -> Result<(), FileError> {
     let share = bad as f64 / all.max(1) as f64;
     if share > MOST_INVALID {
-        return Err(LoadError::MostlyInvalid { file: file.to_owned(), what: what(), share });
+        let (percent, what) = (100.0 * share, what());
+        let what =
+            format!("{percent:.0} % of the {what} are no measurement (NaN, infinite or depth 0): too few are left");
+        let hint = "record the grasp again, or remove the file";
+        return Err(FileError::new(file, what, hint).of_kind(FileErrorKind::Content));
     }
     Ok(())
 }
@@ -418,13 +424,13 @@ mod tests {
         std::fs::write(&file, b"").unwrap();
         let dataset = Dataset::open(dir.path()).unwrap();
         let error =
-            dataset.catch_panic(PairId(0), || -> Result<(), LoadError> { panic!("the depth is {}", 3) }).unwrap_err();
+            dataset.catch_panic(PairId(0), || -> Result<(), FileError> { panic!("the depth is {}", 3) }).unwrap_err();
         let problem = error.to_problem();
         assert!(
             problem.what.contains("a bug: the depth is 3") && problem.what.contains("a_gelslim.png"),
             "{problem:?}"
         );
         assert_eq!(problem.file, dir.path().canonicalize().unwrap().join("a_gelslim.png"));
-        assert!(dataset.load(PairId(0)).is_err_and(|err| !matches!(err, LoadError::Bug { .. })));
+        assert!(dataset.load(PairId(0)).is_err_and(|err| !err.what.contains("a bug")));
     }
 }

@@ -3,6 +3,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use super::error::{FileError, FileErrorKind};
 use super::files::Identity;
 
 /// A folder that is remembered by what it is and not by its path alone: while a data set is open its folder may be renamed,
@@ -11,15 +12,6 @@ use super::files::Identity;
 pub struct DatasetLocation {
     root: PathBuf,
     identity: Identity,
-}
-
-/// A data set is not where it was opened.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the data set is not where it was opened: {} {how}", root.display())]
-pub struct DatasetMoved {
-    /// Folder of the data set, as it was opened.
-    pub root: PathBuf,
-    how: String,
 }
 
 impl DatasetLocation {
@@ -42,9 +34,13 @@ impl DatasetLocation {
     /// Checks that the folder is still there.
     ///
     /// # Errors
-    /// [`DatasetMoved`], also where the system does not say.
-    pub fn check(&self) -> Result<(), DatasetMoved> {
-        let away = |how: String| Err(DatasetMoved { root: self.root.clone(), how });
+    /// [`FileErrorKind::Lost`], also where the system does not say.
+    pub fn check(&self) -> Result<(), FileError> {
+        let away = |how: String| {
+            let what = format!("the data set is not where it was opened: {} {how}", self.root.display());
+            let hint = "put the data set back where it was, or save the labels elsewhere";
+            Err(FileError::new("", what, hint).of_kind(FileErrorKind::Lost))
+        };
         match std::fs::metadata(&self.root) {
             Ok(found) if Identity::of(&found) == self.identity => Ok(()),
             Ok(_) => away("is another folder now".into()),

@@ -7,7 +7,8 @@ use std::path::PathBuf;
 
 use rayon::prelude::*;
 
-use super::dataset::{Dataset, Loaded, OpenError};
+use super::dataset::{Dataset, Loaded};
+use super::error::FileError;
 use touch2touch_core::dataset::{PairId, Problem, Split};
 use touch2touch_core::findings::{Finding, Findings};
 use touch2touch_core::turn::Turn;
@@ -26,7 +27,7 @@ pub struct DoctorReport {
 
 impl DoctorReport {
     /// Of a data set whose pairs cannot be read at all.
-    pub fn refused(why: &OpenError) -> Self {
+    pub fn refused(why: &FileError) -> Self {
         let mut findings = Findings::default();
         findings.add(why.to_problem());
         Self { pairs: 0, examined: 0, problems: findings.into_list() }
@@ -58,7 +59,7 @@ pub fn examine(
         // A missing file is found when the data set is opened.
         findings.extend(match dataset.tool_with_notes(&tool) {
             Ok(file) => file.map_or_else(Vec::new, |file| file.notes),
-            Err(err) => vec![Problem { file: err.file().to_owned(), what: err.to_string(), hint: err.hint().into() }],
+            Err(err) => vec![err.to_problem()],
         });
     }
     let mut few = FewInvalid::default();

@@ -18,26 +18,23 @@ mod split;
 mod unet;
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::path::Path;
 
 use serde::{Deserialize, Serialize};
+use strum::{EnumIter, EnumString, IntoStaticStr};
 
 use super::digest::sha256;
+use super::error::FileError;
 use super::files;
-use super::images::PictureError;
 use super::masks::MaskStore;
 use super::staging::{self, Staging};
-use touch2touch_core::dataset::Problem;
 use touch2touch_core::grid::{DepthMap, Mask};
 use touch2touch_core::rig::{PadId, Rig};
 
 pub use format::Format;
 pub use found::Listed;
-pub(crate) use found::ReadError;
 pub use read::list;
 pub(crate) use split::Stems;
-pub use unet::check_folder;
 
 /// The imprint that becomes 0, meters.
 pub(crate) const IMAGE_LO_M: f64 = -0.0116;
@@ -49,64 +46,6 @@ pub const PARTS: [&str; 3] = ["train", "val", "test"];
 pub const IGNORED: &str = "ignore";
 /// The file that marks a folder as a previous export and lists what it wrote.
 pub const MANIFEST: &str = "touch2touch_export.json";
-
-/// Why nothing was exported. The folder is then as it was.
-#[derive(Debug, thiserror::Error)]
-pub enum ExportError {
-    /// The disk refuses.
-    #[error("cannot {what} ({}): {source}", path.display())]
-    Io {
-        /// The file or folder.
-        path: PathBuf,
-        /// Failed action, as in "cannot make the folder".
-        what: &'static str,
-        /// The system's reason.
-        source: std::io::Error,
-    },
-    /// A picture cannot be written or read again.
-    #[error(transparent)]
-    Picture(#[from] PictureError),
-    /// The folder holds something else.
-    #[error("the folder is not empty and not a previous export: it holds {found} ({})", folder.display())]
-    NotOurs {
-        /// The folder.
-        folder: PathBuf,
-        /// The first foreign entry.
-        found: String,
-    },
-    /// Somebody stopped it.
-    #[error("the export was stopped")]
-    Stopped,
-    /// Nothing to export.
-    #[error("there is no mask to export")]
-    Nothing,
-    /// A mask whose size is not the imprint's.
-    #[error("the mask of {stem} has {mask:?} pixels, its imprint {imprint:?}")]
-    Size {
-        /// The stem.
-        stem: String,
-        /// The mask's size.
-        mask: [usize; 2],
-        /// The imprint's size.
-        imprint: [usize; 2],
-    },
-    /// Imprints or masks that could not be fetched.
-    #[error("nothing was exported: {}", listed(failures))]
-    Sources {
-        /// Pair and finger, and why; all of them.
-        failures: Vec<(String, String)>,
-    },
-    /// The written folder is not one that the loader accepts, or not the one that was meant.
-    #[error("the written folder failed its check: {}", first(problems))]
-    Check {
-        /// All mismatches.
-        problems: Vec<Problem>,
-    },
-}
-
-fn first(problems: &[Problem]) -> String {
-    problems.first().map_or_else(String::new, |p| format!("{} ({})", p.what, p.file.display()))
-}
 
 /// One failure as it is, several one below the other.
 fn listed(failures: &[(String, String)]) -> String {
@@ -135,25 +74,42 @@ pub struct ExportEntry {
     pub held_out: bool,
 }
 
-/// In which form, and how to divide.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ExportConfig {
-    /// The form.
-    pub format: Format,
-    /// Decides which pair lands where; the same seed and pairs give the same parts.
-    pub seed: u64,
-    /// True where all pairs of a tool go to the same part; else each pair goes by itself.
-    pub by_tool: bool,
-    /// True where held-out pairs are divided like the rest; else they go to test.
-    pub held_out_in_train: bool,
-    /// The names of the pads.
-    pub rig: Arc<Rig>,
+/// Pairs that go along, by their review state. Pairs marked *skip* or *flagged* never do.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, EnumIter, EnumString, IntoStaticStr)]
+#[strum(serialize_all = "snake_case")]
+pub enum Which {
+    /// Pairs marked *done* that have a mask drawn by hand.
+    #[default]
+    Done,
+    /// Pairs as above, and pairs whose mask was begun.
+    Begun,
+    /// All pairs; the masks that nobody drew are made (`--mask`).
+    All,
 }
 
-impl Default for ExportConfig {
-    fn default() -> Self {
-        Self { format: Format::default(), seed: 0, by_tool: false, held_out_in_train: false, rig: Rig::lab() }
+impl Which {
+    /// The name on the command line.
+    pub fn key(self) -> &'static str {
+        self.into()
     }
+}
+
+/// Choices that a person has for an export.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct ExportChoice {
+    /// Pairs, by review state.
+    pub which: Which,
+    /// True where pairs that the data set keeps for tests (`test_only`) are divided like the rest; else they go to
+    /// test.
+    pub test_in_train: bool,
+    /// True where all pairs of a tool go to the same part.
+    pub by_tool: bool,
+    /// True where only pixels that a person painted count; all others are ignored.
+    pub manual_checked: bool,
+    /// Decides which pair lands in which part.
+    pub seed: u64,
+    /// In which form.
+    pub format: Format,
 }
 
 /// Counts of an export.
@@ -194,36 +150,21 @@ impl Manifest {
 /// Reads every stored mask of `entries`, before anything is computed for the others.
 ///
 /// # Errors
-/// [`ExportError::Sources`] with all that cannot be read.
+/// [`FileError`] with all that cannot be read.
 pub(crate) fn check_stored<'a>(
     store: &MaskStore,
     entries: impl IntoIterator<Item = &'a ExportEntry>,
-) -> Result<(), ExportError> {
+) -> Result<(), FileError> {
     let failure = |entry: &ExportEntry| {
         let err = store.load(&entry.pair, entry.finger).err()?;
-        Some((place(entry, store.rig()), format!("{err}; {}", err.hint())))
+        Some((place(entry, store.rig()), format!("{err}; {}", err.hint)))
     };
     let failures: Vec<_> = entries.into_iter().filter_map(failure).collect();
-    if failures.is_empty() { Ok(()) } else { Err(ExportError::Sources { failures }) }
+    if failures.is_empty() { Ok(()) } else { Err(sources(&failures)) }
 }
 
 fn place(entry: &ExportEntry, rig: &Rig) -> String {
     format!("{}, {} finger", entry.pair, rig.pad_key(entry.finger))
-}
-
-/// Why an imprint or a mask was not fetched.
-#[derive(Debug)]
-pub enum LoadFailure {
-    /// It cannot be read or made, in words; the others are still looked at.
-    Bad(String),
-    /// Somebody stopped the export.
-    Stop,
-}
-
-impl<E: std::fmt::Display> From<E> for LoadFailure {
-    fn from(err: E) -> Self {
-        Self::Bad(err.to_string())
-    }
 }
 
 /// Pixels that are written of one entry; all pictures are of one size.
@@ -238,50 +179,51 @@ pub struct Content {
 }
 
 /// Number of `entries` that go to each of [`PARTS`].
-pub fn counts(entries: &[ExportEntry], config: &ExportConfig) -> [usize; 3] {
+pub fn counts(entries: &[ExportEntry], choice: &ExportChoice) -> [usize; 3] {
     let mut counts = [0; 3];
-    split::parts(entries, config).into_iter().for_each(|part| counts[part] += 1);
+    split::parts(entries, choice).into_iter().for_each(|part| counts[part] += 1);
     counts
 }
 
 /// Writes `entries` to `folder`; `load(i)` gives the content of `entries[i]`.
 ///
 /// Everything is written and checked in a new folder beside `folder` and put in its place only when it is right; a
-/// previous export there is replaced. Same entries, config and content: same bytes.
+/// previous export there is replaced. Same entries, choices and content: same bytes.
 ///
 /// # Errors
-/// [`ExportError`]; then `folder` is as it was.
+/// [`FileError`]; then `folder` is as it was.
 pub fn export(
     folder: &Path,
     entries: &[ExportEntry],
-    config: &ExportConfig,
-    mut load: impl FnMut(usize) -> Result<Content, LoadFailure>,
-) -> Result<ExportReport, ExportError> {
+    choice: &ExportChoice,
+    rig: &Rig,
+    mut load: impl FnMut(usize) -> anyhow::Result<Content>,
+) -> Result<ExportReport, FileError> {
     if entries.is_empty() {
-        return Err(ExportError::Nothing);
+        return Err(FileError::new(folder, "there is no mask to export", ""));
     }
     let folder = std::path::absolute(folder).map_err(|s| io(folder, "find the folder", s))?;
     refuse_foreign(&folder)?;
-    let parts = split::parts(entries, config);
-    let stems = split::stems(entries, &config.rig);
+    let parts = split::parts(entries, choice);
+    let stems = split::stems(entries, rig);
     let parent = folder.parent().unwrap_or(&folder).to_owned();
     std::fs::create_dir_all(&parent).map_err(|s| io(&parent, "make the folder", s))?;
     staging::sweep(&parent);
     let staging = Staging::new(&folder).map_err(|s| io(&parent, "make a folder in", s))?;
     let root = staging.new_content();
     for folder in PARTS.map(|part| root.join(part)) {
-        match config.format {
+        match choice.format {
             Format::Unet => ["imgs", "masks"].iter().try_for_each(|kind| make_folder(&folder.join(kind)))?,
             Format::Png => make_folder(&folder)?,
         }
     }
     let mut report = ExportReport::default();
-    let source = |entry: &ExportEntry| (entry.pair.clone(), config.rig.pad_key(entry.finger).into_owned());
+    let source = |entry: &ExportEntry| (entry.pair.clone(), rig.pad_key(entry.finger).into_owned());
     let mut manifest = Manifest {
         format: FORMAT.into(),
         version: 1,
-        masks: config.format,
-        seed: config.seed,
+        masks: choice.format,
+        seed: choice.seed,
         files: BTreeMap::new(),
         stems: stems.iter().cloned().zip(entries.iter().map(source)).collect(),
     };
@@ -290,11 +232,10 @@ pub fn export(
     for (i, (stem, &part)) in stems.iter().zip(&parts).enumerate() {
         let mut content = match load(i) {
             Ok(content) => content,
-            Err(LoadFailure::Bad(reason)) => {
-                failures.push((place(&entries[i], &config.rig), reason));
+            Err(err) => {
+                failures.push((place(&entries[i], rig), err.to_string()));
                 continue;
             }
-            Err(LoadFailure::Stop) => return Err(ExportError::Stopped),
         };
         // What follows only looks for what else is wrong.
         if !failures.is_empty() {
@@ -303,26 +244,23 @@ pub fn export(
         let size = content.imprint.size();
         for mask in std::iter::once(&content.mask).chain(&content.ignored) {
             if mask.size() != size {
-                return Err(ExportError::Size { stem: stem.clone(), mask: mask.size(), imprint: size });
+                let what = format!("the mask of {stem} has {:?} pixels, its imprint {size:?}", mask.size());
+                return Err(FileError::new("", what, ""));
             }
         }
         content.ignored = content.ignored.filter(|ignored| ignored.as_slice().contains(&true));
         report.counts[part] += 1;
         let to = root.join(PARTS[part]);
-        match config.format {
+        match choice.format {
             Format::Unet => unet::write(&to, stem, &content, &mut report),
             Format::Png => format::write_masks(&to, stem, &content),
-        }
-        .map_err(|err| meant(err, &root, &folder))?;
+        }?;
         written.insert(stem.clone(), digest(&content.mask, content.ignored.as_ref()));
     }
     if !failures.is_empty() {
-        return Err(ExportError::Sources { failures });
+        return Err(sources(&failures));
     }
-    let problems = check_written(&root, config.format, written);
-    if !problems.is_empty() {
-        return Err(meant(ExportError::Check { problems }, &root, &folder));
-    }
+    check_written(&root, choice.format, written).map_err(|err| meant(err, &root, &folder))?;
     let mut files = Vec::new();
     find(&root, &root, &mut files).map_err(|s| io(&root, "list the folder", s))?;
     for relative in files {
@@ -331,28 +269,30 @@ pub fn export(
         manifest.files.insert(relative, sha256(&bytes));
     }
     let path = root.join(MANIFEST);
-    let text = serde_json::to_vec_pretty(&manifest).map_err(|err| io(&path, "write", err.into()))?;
-    super::atomic::write_bytes(&path, &text).map_err(|s| io(&path, "write", s))?;
+    super::atomic::write_json(&path, "cannot write", &manifest)?;
     // Once more, in case something appeared while the masks were computed.
     refuse_foreign(&folder)?;
     staging.put(&folder).map_err(|source| io(&folder, "put the export to", source))?;
     Ok(report)
 }
 
-fn io(path: &Path, what: &'static str, source: std::io::Error) -> ExportError {
-    ExportError::Io { path: path.to_owned(), what, source }
+fn io(path: &Path, what: &str, err: std::io::Error) -> FileError {
+    FileError::io(path, &format!("cannot {what}"), err)
 }
 
-fn make_folder(path: &Path) -> Result<(), ExportError> {
+fn sources(failures: &[(String, String)]) -> FileError {
+    FileError::new("", format!("nothing was exported: {}", listed(failures)), "")
+}
+
+fn make_folder(path: &Path) -> Result<(), FileError> {
     std::fs::create_dir_all(path).map_err(|source| io(path, "make the folder", source))
 }
 
-/// A failed check that names files where they would have come to lie, in `folder`, instead of where they were made.
-fn meant(err: ExportError, root: &Path, folder: &Path) -> ExportError {
-    let ExportError::Check { problems } = err else { return err };
-    let moved = |file: PathBuf| file.strip_prefix(root).map(|f| folder.join(f)).unwrap_or(file);
-    let problems = problems.into_iter().map(|p| Problem { file: moved(p.file), ..p }).collect();
-    ExportError::Check { problems }
+/// A failed check that names its file where it would have come to lie, in `folder`, instead of where it was made.
+fn meant(err: FileError, root: &Path, folder: &Path) -> FileError {
+    let file = err.file.strip_prefix(root).map_or_else(|_| err.file.clone(), |file| folder.join(file));
+    let what = format!("the written folder failed its check: {}", err.what);
+    FileError { file, what, ..err }
 }
 
 /// SHA-256 of a mask's size and pixels with its ignored pixels, which tells it from all others.
@@ -363,36 +303,25 @@ fn digest(mask: &Mask, ignored: Option<&Mask>) -> String {
     sha256(&[&width.to_le_bytes()[..], &height.to_le_bytes(), &bits(mask), &ignored].concat())
 }
 
-/// Reads what was written by the rules of its loader: each of `written` (stem to [`digest`]) must be there and the same, and
-/// nothing else.
-fn check_written(root: &Path, format: Format, mut written: BTreeMap<String, String>) -> Vec<Problem> {
-    let problem = |file: &Path, what: String| Problem {
-        file: file.to_owned(),
-        what,
-        hint: "check the disk, and export again".into(),
-    };
-    let mut problems = if format == Format::Unet { check_folder(root).problems } else { Vec::new() };
-    let listing = match list(root, Some(format)) {
-        Ok(listing) => listing,
-        Err(err) => return vec![problem(&err.file, err.what)],
-    };
-    problems.extend(listing.refused.iter().map(|err| problem(&err.file, err.what.clone())));
+/// Reads what was written: each of `written` (stem to [`digest`]) must be there and the same, and nothing else.
+fn check_written(root: &Path, format: Format, mut written: BTreeMap<String, String>) -> Result<(), FileError> {
+    let fail = |file: &Path, what: String| FileError::new(file, what, "check the disk, and export again");
+    let listing = list(root, Some(format))?;
+    if let Some(refused) = listing.refused.into_iter().next() {
+        return Err(refused);
+    }
     for listed in &listing.masks {
         let expected = written.remove(&listed.stem);
-        match listed.read() {
-            Err(err) => problems.push(problem(&err.file, err.what)),
-            Ok((mask, ignored)) if expected != Some(digest(&mask, ignored.as_ref())) => {
-                problems.push(problem(&listed.file, format!("the mask of {} reads back differently", listed.stem)));
-            }
-            Ok(_) => {}
+        let (mask, ignored) = listed.read()?;
+        if expected != Some(digest(&mask, ignored.as_ref())) {
+            return Err(fail(&listed.file, format!("the mask of {} reads back differently", listed.stem)));
         }
     }
-    problems.extend(written.into_keys().map(|stem| problem(root, format!("the mask of {stem} is not there"))));
-    problems
+    written.into_keys().next().map_or(Ok(()), |stem| Err(fail(root, format!("the mask of {stem} is not there"))))
 }
 
 /// An existing folder must be empty, or hold exactly what its manifest says.
-fn refuse_foreign(folder: &Path) -> Result<(), ExportError> {
+fn refuse_foreign(folder: &Path) -> Result<(), FileError> {
     let mut files = Vec::new();
     match find(folder, folder, &mut files) {
         Ok(()) => {}
@@ -402,7 +331,10 @@ fn refuse_foreign(folder: &Path) -> Result<(), ExportError> {
     let known = Manifest::read(folder).map(|manifest| manifest.files).unwrap_or_default();
     let is_manifest = |file: &str| file == MANIFEST && !known.is_empty();
     match files.into_iter().find(|file| !known.contains_key(file) && !is_manifest(file)) {
-        Some(found) => Err(ExportError::NotOurs { folder: folder.to_owned(), found }),
+        Some(found) => {
+            let what = format!("the folder is not empty and not a previous export: it holds {found}");
+            Err(FileError::new(folder, what, "choose another folder"))
+        }
         None => Ok(()),
     }
 }
@@ -446,16 +378,16 @@ mod tests {
         };
         for format in Format::iter() {
             let folder = dir.path().join(format.key());
-            let config = ExportConfig { format, ..ExportConfig::default() };
-            export(&folder, &entries, &config, |i| Ok(content(i))).unwrap();
-            let stems = split::stems(&entries, &config.rig);
+            let choice = ExportChoice { format, ..ExportChoice::default() };
+            export(&folder, &entries, &choice, &Rig::lab(), |i| Ok(content(i))).unwrap();
+            let stems = split::stems(&entries, &Rig::lab());
             let written = |i: usize| (stems[i].clone(), digest(&mask(i), content(i).ignored.as_ref()));
             let check = |which: &[usize]| check_written(&folder, format, which.iter().map(|&i| written(i)).collect());
-            assert_eq!(check(&[0, 1, 2]), [], "{format:?}");
-            assert!(check(&[0, 1])[0].what.contains("reads back differently"), "nobody wrote the third");
+            assert_eq!(check(&[0, 1, 2]), Ok(()), "{format:?}");
+            assert!(check(&[0, 1]).unwrap_err().what.contains("reads back differently"), "nobody wrote the third");
             let extra = BTreeMap::from([0, 1, 2].map(written)).into_iter().chain([("gone".to_owned(), String::new())]);
-            let gone = check_written(&folder, format, extra.collect());
-            assert!(gone.len() == 1 && gone[0].what.contains("the mask of gone is not there"), "{gone:?}");
+            let gone = check_written(&folder, format, extra.collect()).unwrap_err();
+            assert!(gone.what.contains("the mask of gone is not there"), "{gone:?}");
             let (other, stem) = (format::gray(&mask(5)), &stems[2]);
             let name = match format {
                 Format::Unet => format!("masks/{stem}.png"),
@@ -463,9 +395,9 @@ mod tests {
             };
             let file = PARTS.map(|part| folder.join(part).join(&name)).into_iter().find(|file| file.is_file()).unwrap();
             crate::io::images::write_gray8(&file, &other).unwrap();
-            let found = check(&[0, 1, 2]);
-            assert!(found.len() == 1 && found[0].file == file, "{format:?}: {found:?}");
-            let err = meant(ExportError::Check { problems: found }, &folder, Path::new("/there"));
+            let found = check(&[0, 1, 2]).unwrap_err();
+            assert_eq!(found.file, file, "{format:?}: {found:?}");
+            let err = meant(found, &folder, Path::new("/there"));
             let name = file.file_name().unwrap().to_str().unwrap();
             assert!(err.to_string().contains("/there/") && err.to_string().contains(name), "{err}");
         }

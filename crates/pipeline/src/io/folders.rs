@@ -18,13 +18,13 @@ pub fn data() -> Option<PathBuf> {
 /// home folder.
 pub(crate) fn program_data() -> Option<PathBuf> {
     let named = std::env::var_os("TOUCH2TOUCH_DATA").filter(|v| !v.is_empty()).map(PathBuf::from);
-    named.or_else(local_data)
+    named.or_else(|| Some(dirs::data_local_dir()?.join(NAME)))
 }
 
 /// Folder for data that can be made again; `TOUCH2TOUCH_CACHE` overrides it.
 pub fn program_cache() -> Option<PathBuf> {
     let named = std::env::var_os("TOUCH2TOUCH_CACHE").map(PathBuf::from).filter(|p| p.is_absolute());
-    named.or_else(cache)
+    named.or_else(|| Some(dirs::cache_dir()?.join(NAME)))
 }
 
 /// The user's pictures; made if it is not there. `None` without a home folder, or where it cannot be made.
@@ -65,12 +65,4 @@ pub fn reveal(place: &Path) -> std::io::Result<()> {
         std::process::Command::new(program).arg(folder).stdin(null()).stdout(null()).stderr(null()).spawn()?;
     // Waited for, so that nothing of it is left behind; by nobody else, because it may stay open.
     std::thread::Builder::new().name("reveal".into()).spawn(move || shown.wait().ok()).map(drop)
-}
-
-fn local_data() -> Option<PathBuf> {
-    Some(dirs::data_local_dir()?.join(NAME))
-}
-
-fn cache() -> Option<PathBuf> {
-    Some(dirs::cache_dir()?.join(NAME))
 }

@@ -2,7 +2,7 @@
 //! which it lacks.
 
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, OnceLock, PoisonError};
+use std::sync::OnceLock;
 
 use ab_glyph::{Font as _, FontRef};
 
@@ -49,7 +49,7 @@ pub fn covering(letters: &[char]) -> Option<&'static SystemFont> {
     let installed = INSTALLED.get_or_init(|| {
         let mut files = Vec::new();
         folders::fonts().iter().for_each(|folder| find(folder, 0, &mut files));
-        ranked(files).into_iter().map(Candidate::new).collect()
+        ranked(files).into_iter().map(|file| Candidate { file, font: OnceLock::new() }).collect()
     });
     first_with(installed, letters)
 }
@@ -66,17 +66,12 @@ fn first_with(candidates: &[Candidate], letters: &[char]) -> Option<&'static Sys
 struct Candidate {
     file: PathBuf,
     /// The font, once it was asked for; it stays for the rest of the run, as the window wants it.
-    font: Mutex<Option<Option<&'static SystemFont>>>,
+    font: OnceLock<Option<&'static SystemFont>>,
 }
 
 impl Candidate {
-    fn new(file: PathBuf) -> Self {
-        Self { file, font: Mutex::new(None) }
-    }
-
     fn font(&self) -> Option<&'static SystemFont> {
-        let mut font = self.font.lock().unwrap_or_else(PoisonError::into_inner);
-        *font.get_or_insert_with(|| {
+        *self.font.get_or_init(|| {
             let bytes = files::read(&self.file, MOST).ok()?;
             FontRef::try_from_slice(&bytes).ok()?;
             let name = String::leak(self.file.file_name()?.to_string_lossy().into_owned());
@@ -148,7 +143,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let candidate = |name: &str, bytes: &[u8]| {
             std::fs::write(dir.path().join(name), bytes).unwrap();
-            Candidate::new(dir.path().join(name))
+            Candidate { file: dir.path().join(name), font: OnceLock::new() }
         };
         let candidates = [candidate("damaged.ttc", &REGULAR[..2000]), candidate("latin.ttf", REGULAR)];
         assert_eq!(first_with(&candidates, &['a', 'é']).map(|font| font.name), Some("latin.ttf"));

@@ -1,102 +1,57 @@
 //! Pictures (PNG, and JPEG for reading) to and from [`Grid`]s.
 
+use std::fmt::Display;
 use std::io::Cursor;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use image::{DynamicImage, ExtendedColorType, ImageDecoder as _, ImageFormat, ImageReader};
 
+use super::error::FileError;
 use super::files;
 use touch2touch_core::grid::{DepthMap, Grid, RgbGrid};
-
-/// Why a picture cannot be read or written.
-#[derive(Debug, thiserror::Error)]
-pub enum PictureError {
-    /// The file cannot be opened, read or written.
-    #[error("cannot access the picture ({}): {source}", file.display())]
-    Io {
-        /// The file.
-        file: PathBuf,
-        /// The system's reason.
-        source: std::io::Error,
-    },
-    /// The file is no PNG or JPEG, or a damaged one.
-    #[error("not a readable PNG or JPEG: {source} ({})", file.display())]
-    Decode {
-        /// The file.
-        file: PathBuf,
-        /// The decoder's reason.
-        source: image::ImageError,
-    },
-    /// The picture has too many pixels.
-    #[error("the picture is {} x {} pixels; at most {MAX_SIDE} a side are read ({})", size[0], size[1], file.display())]
-    TooLarge {
-        /// The file.
-        file: PathBuf,
-        /// Width and height.
-        size: [u32; 2],
-    },
-    /// The picture has other channels or another depth than asked for.
-    #[error("the picture is {found}, expected {expected} ({})", file.display())]
-    Kind {
-        /// The file.
-        file: PathBuf,
-        /// Form of the picture.
-        found: String,
-        /// Form that is needed.
-        expected: &'static str,
-    },
-}
-
-impl PictureError {
-    /// The file it is about.
-    pub fn file(&self) -> &Path {
-        match self {
-            Self::Io { file, .. }
-            | Self::Decode { file, .. }
-            | Self::TooLarge { file, .. }
-            | Self::Kind { file, .. } => file,
-        }
-    }
-
-    /// Advice for the user.
-    pub fn hint(&self) -> &'static str {
-        match self {
-            Self::Io { .. } => "check that the file exists and may be read, and that the disk has room",
-            Self::Decode { .. } => "copy or save the picture again",
-            Self::TooLarge { .. } => "save the picture smaller: the sensors have fewer than 500 pixels a side",
-            Self::Kind { .. } => "save the picture again in that form",
-        }
-    }
-}
 
 /// Most pixels a side. A file of a few kilobytes can announce a thousand times more.
 pub(crate) const MAX_SIDE: u32 = 4096;
 /// Most bytes of a file: what a picture of that size takes without compression.
 const MAX_BYTES: u64 = 256 << 20;
 
-fn decode(path: &Path) -> Result<DynamicImage, PictureError> {
-    let io = |source| PictureError::Io { file: path.to_owned(), source };
-    let bytes = files::read(path, MAX_BYTES).map_err(io)?;
+fn decode(path: &Path) -> Result<DynamicImage, FileError> {
+    let bytes = files::read(path, MAX_BYTES).map_err(|err| cannot_access(path, err))?;
     let jpeg = bytes.starts_with(&[0xff, 0xd8]);
     // A JPEG decoder fills what is cut off with gray: the end mark tells a whole file from one being written.
     if jpeg && jpeg_end(&bytes).is_none() {
-        let cut = std::io::Error::new(std::io::ErrorKind::UnexpectedEof, "the end of the JPEG is missing");
-        return Err(PictureError::Decode { file: path.to_owned(), source: image::ImageError::IoError(cut) });
+        return Err(unreadable(path, "the end of the JPEG is missing"));
     }
     let mut reader = ImageReader::new(Cursor::new(bytes));
     reader.set_format(if jpeg { ImageFormat::Jpeg } else { ImageFormat::Png });
-    let failed = |source| PictureError::Decode { file: path.to_owned(), source };
+    let failed = |err| unreadable(path, err);
     // The size is in the header: it is looked at before there is room for a single pixel.
     let mut decoder = reader.into_decoder().map_err(failed)?;
     let (width, height) = decoder.dimensions();
     if width.max(height) > MAX_SIDE {
-        return Err(PictureError::TooLarge { file: path.to_owned(), size: [width, height] });
+        let what = format!("the picture is {width} x {height} pixels; at most {MAX_SIDE} a side are read");
+        let hint = "save the picture smaller: the sensors have fewer than 500 pixels a side";
+        return Err(FileError::new(path, what, hint));
     }
     // Cameras and phones store pictures as the sensor lies and say how they are to be turned.
     let orientation = decoder.orientation().map_err(failed)?;
     let mut image = DynamicImage::from_decoder(decoder).map_err(failed)?;
     image.apply_orientation(orientation);
     Ok(image)
+}
+
+pub(super) fn cannot_access(path: &Path, err: std::io::Error) -> FileError {
+    FileError::io(path, "cannot access the picture", err)
+}
+
+fn unreadable(path: &Path, err: impl Display) -> FileError {
+    FileError::new(path, format!("not a readable PNG or JPEG: {err}"), "copy or save the picture again")
+}
+
+/// The refusal of a picture with other channels, another depth or other values than are needed.
+pub(super) fn wrong_kind(path: &Path, found: impl Display, expected: &str) -> FileError {
+    let what = format!("the picture is {found}, expected {expected}");
+    FileError::new(path, what, "save the picture again in that form")
 }
 
 /// Place behind the end mark of a JPEG; `None` where there is none.
@@ -129,8 +84,8 @@ fn grid<T: Copy>(width: u32, height: u32, pixels: Vec<T>) -> Grid<T> {
 /// Reads any PNG or JPEG as color on the 0..255 scale; gray is repeated, 16 bits are scaled down, alpha is dropped.
 ///
 /// # Errors
-/// [`PictureError`].
-pub fn read_rgb(path: &Path) -> Result<RgbGrid, PictureError> {
+/// [`FileError`].
+pub fn read_rgb(path: &Path) -> Result<RgbGrid, FileError> {
     let image = decode(path)?;
     let (w, h) = (image.width(), image.height());
     Ok(match image {
@@ -145,20 +100,18 @@ pub fn read_rgb(path: &Path) -> Result<RgbGrid, PictureError> {
 /// Reads any PNG or JPEG as gray on the 0..255 scale; 16 bits keep their fractions, color is weighted, alpha is dropped.
 ///
 /// # Errors
-/// [`PictureError`].
-pub fn read_gray(path: &Path) -> Result<Grid<f32>, PictureError> {
+/// [`FileError`].
+pub fn read_gray(path: &Path) -> Result<Grid<f32>, FileError> {
     Ok(gray(decode(path)?))
 }
 
 fn gray(image: DynamicImage) -> Grid<f32> {
     let (w, h) = (image.width(), image.height());
     match image {
-        DynamicImage::ImageLuma8(_) | DynamicImage::ImageLumaA8(_) => {
-            grid(w, h, image.into_luma8().into_raw().into_iter().map(f32::from).collect())
-        }
-        DynamicImage::ImageRgb8(_) | DynamicImage::ImageRgba8(_) => {
-            grid(w, h, image.into_luma8().into_raw().into_iter().map(f32::from).collect())
-        }
+        DynamicImage::ImageLuma8(_)
+        | DynamicImage::ImageLumaA8(_)
+        | DynamicImage::ImageRgb8(_)
+        | DynamicImage::ImageRgba8(_) => grid(w, h, image.into_luma8().into_raw().into_iter().map(f32::from).collect()),
         other => grid(w, h, other.into_luma16().into_raw().into_iter().map(|v| f32::from(v) / 257.0).collect()),
     }
 }
@@ -166,8 +119,8 @@ fn gray(image: DynamicImage) -> Grid<f32> {
 /// Reads a gray picture of 16 bits value by value; any other as [`read_gray`] does.
 ///
 /// # Errors
-/// [`PictureError`].
-pub(crate) fn read_depth(path: &Path) -> Result<Result<Grid<u16>, Grid<f32>>, PictureError> {
+/// [`FileError`].
+pub(crate) fn read_depth(path: &Path) -> Result<Result<Grid<u16>, Grid<f32>>, FileError> {
     match decode(path)? {
         DynamicImage::ImageLuma16(image) => Ok(Ok(grid(image.width(), image.height(), image.into_raw()))),
         other => Ok(Err(gray(other))),
@@ -177,11 +130,11 @@ pub(crate) fn read_depth(path: &Path) -> Result<Result<Grid<u16>, Grid<f32>>, Pi
 /// Reads a PNG that must be 8-bit gray without alpha, value by value.
 ///
 /// # Errors
-/// [`PictureError::Kind`] for any other kind.
-pub fn read_gray8(path: &Path) -> Result<Grid<u8>, PictureError> {
+/// [`FileError`] for any other kind.
+pub fn read_gray8(path: &Path) -> Result<Grid<u8>, FileError> {
     match decode(path)? {
         DynamicImage::ImageLuma8(image) => Ok(grid(image.width(), image.height(), image.into_raw())),
-        other => Err(wrong_kind(path, &other, "8-bit gray")),
+        other => Err(wrong_kind(path, format_args!("{:?}", other.color()), "8-bit gray")),
     }
 }
 
@@ -189,8 +142,8 @@ pub fn read_gray8(path: &Path) -> Result<Grid<u8>, PictureError> {
 /// transparent is black; the one color is 255.
 ///
 /// # Errors
-/// [`PictureError::Kind`] for a picture of several colors.
-pub(crate) fn read_mask(path: &Path) -> Result<Grid<u16>, PictureError> {
+/// [`FileError`] for a picture of several colors.
+pub(crate) fn read_mask(path: &Path) -> Result<Grid<u16>, FileError> {
     let image = match decode(path)? {
         DynamicImage::ImageLuma8(image) => {
             return Ok(grid(image.width(), image.height(), image.into_raw().into_iter().map(u16::from).collect()));
@@ -209,32 +162,28 @@ pub(crate) fn read_mask(path: &Path) -> Result<Grid<u16>, PictureError> {
     };
     match visible.map(level).collect() {
         Some(levels) => Ok(grid(image.width(), image.height(), levels)),
-        None => Err(wrong_kind(path, &image, "gray, or black and one other color")),
+        None => Err(wrong_kind(path, format_args!("{:?}", image.color()), "gray, or black and one other color")),
     }
-}
-
-fn wrong_kind(file: &Path, image: &DynamicImage, expected: &'static str) -> PictureError {
-    PictureError::Kind { file: file.to_owned(), found: format!("{:?}", image.color()), expected }
 }
 
 /// Writes 8-bit gray.
 ///
 /// # Errors
-/// [`PictureError`].
-pub fn write_gray8(path: &Path, picture: &Grid<u8>) -> Result<(), PictureError> {
+/// [`FileError`].
+pub fn write_gray8(path: &Path, picture: &Grid<u8>) -> Result<(), FileError> {
     encode(path, picture.as_slice(), picture.size(), ExtendedColorType::L8)
 }
 
 /// Writes an imprint (meters) as 16-bit gray for people: steps of 0.001 mm from -20 mm.
 ///
 /// # Errors
-/// [`PictureError`].
-pub fn write_depth16(path: &Path, imprint: &DepthMap) -> Result<(), PictureError> {
+/// [`FileError`].
+pub fn write_depth16(path: &Path, imprint: &DepthMap) -> Result<(), FileError> {
     write_gray16(path, &imprint.map(|&d| ((d + 0.02) * 1e6).clamp(0.0, 65535.0) as u16))
 }
 
 /// Writes 16-bit gray.
-fn write_gray16(path: &Path, picture: &Grid<u16>) -> Result<(), PictureError> {
+fn write_gray16(path: &Path, picture: &Grid<u16>) -> Result<(), FileError> {
     // The encoder takes native-endian bytes and writes big-endian ones.
     let bytes: Vec<u8> = picture.as_slice().iter().flat_map(|v| v.to_ne_bytes()).collect();
     encode(path, &bytes, picture.size(), ExtendedColorType::L16)
@@ -243,8 +192,8 @@ fn write_gray16(path: &Path, picture: &Grid<u16>) -> Result<(), PictureError> {
 /// Writes 8-bit color; values are rounded and limited to 0..255, NaN becomes 0.
 ///
 /// # Errors
-/// [`PictureError`].
-pub fn write_rgb8(path: &Path, picture: &RgbGrid) -> Result<(), PictureError> {
+/// [`FileError`].
+pub fn write_rgb8(path: &Path, picture: &RgbGrid) -> Result<(), FileError> {
     let bytes: Vec<u8> = picture.as_slice().iter().flatten().map(|v| v.round() as u8).collect();
     encode(path, &bytes, picture.size(), ExtendedColorType::Rgb8)
 }
@@ -252,8 +201,8 @@ pub fn write_rgb8(path: &Path, picture: &RgbGrid) -> Result<(), PictureError> {
 /// Writes 8-bit color with opacity, not multiplied.
 ///
 /// # Errors
-/// [`PictureError`].
-pub fn write_rgba8(path: &Path, picture: &Grid<[u8; 4]>) -> Result<(), PictureError> {
+/// [`FileError`].
+pub fn write_rgba8(path: &Path, picture: &Grid<[u8; 4]>) -> Result<(), FileError> {
     encode(path, picture.as_slice().as_flattened(), picture.size(), ExtendedColorType::Rgba8)
 }
 
@@ -271,9 +220,9 @@ fn png(bytes: &[u8], [w, h]: [usize; 2], kind: ExtendedColorType) -> Result<Vec<
     Ok(png.into_inner())
 }
 
-fn encode(path: &Path, bytes: &[u8], size: [usize; 2], kind: ExtendedColorType) -> Result<(), PictureError> {
-    let png = png(bytes, size, kind).map_err(|source| PictureError::Decode { file: path.to_owned(), source })?;
-    super::atomic::write_bytes(path, &png).map_err(|source| PictureError::Io { file: path.to_owned(), source })
+fn encode(path: &Path, bytes: &[u8], size: [usize; 2], kind: ExtendedColorType) -> Result<(), FileError> {
+    let png = png(bytes, size, kind).map_err(|err| unreadable(path, err))?;
+    super::atomic::write_bytes(path, &png).map_err(|err| cannot_access(path, err))
 }
 
 #[cfg(test)]

@@ -18,7 +18,9 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::dataset::Dataset;
-use super::dataset_location::{DatasetLocation, DatasetMoved};
+use super::dataset_location::DatasetLocation;
+use super::digest::sha256;
+use super::error::FileError;
 use super::predicted_id::PredictedId;
 use super::{atomic, files, folders, names};
 use touch2touch_core::dataset::Problem;
@@ -39,60 +41,6 @@ const MASK_SUFFIX: &str = ".mask.json";
 const PREDICTED_SUFFIX: &str = ".predicted.json";
 const PREDICTED_FORMAT: &str = "touch2touch-predicted-masks";
 const REVIEW_SUFFIX: &str = ".review.json";
-
-/// Why stored labels cannot be read or written.
-#[derive(Debug, thiserror::Error)]
-pub enum StoreError {
-    /// The disk refuses.
-    #[error("cannot {what} ({}): {source}", file.display())]
-    Io {
-        /// The file or folder.
-        file: PathBuf,
-        /// Failed action, as in "cannot save the labels".
-        what: &'static str,
-        /// The system's reason.
-        source: std::io::Error,
-    },
-    /// The file exists but cannot be understood; it is left as it is and its pair must not be edited.
-    #[error("the stored labels cannot be read, so this pair cannot be edited: {reason} ({})", file.display())]
-    Damaged {
-        /// The file.
-        file: PathBuf,
-        /// Fault of the file.
-        reason: String,
-    },
-    /// The data set is not where it was opened.
-    #[error(transparent)]
-    Lost(#[from] DatasetMoved),
-    /// No folder can be written.
-    #[error("no folder for masks can be written; tried {tried}")]
-    NoFolder {
-        /// The folders tried.
-        tried: String,
-    },
-}
-
-impl StoreError {
-    /// Advice for the user.
-    pub fn hint(&self) -> &'static str {
-        match self {
-            Self::Io { .. } => "check the permissions and the free space of the disk",
-            Self::Damaged { .. } => "restore the file from a backup, or move it away to start this mask anew",
-            Self::Lost(_) => "put the data set back where it was, or save the labels elsewhere",
-            Self::NoFolder { .. } => "make one of these folders writable, or set XDG_DATA_HOME to one that is",
-        }
-    }
-
-    fn to_problem(&self) -> Problem {
-        let file = match self {
-            Self::Io { file, .. } | Self::Damaged { file, .. } | Self::Lost(DatasetMoved { root: file, .. }) => {
-                file.clone()
-            }
-            Self::NoFolder { .. } => PathBuf::new(),
-        };
-        Problem { file, what: self.to_string(), hint: self.hint().into() }
-    }
-}
 
 /// A stored mask with where it came from.
 #[derive(Clone, Debug, PartialEq)]
@@ -219,13 +167,13 @@ impl MaskStore {
     /// Finds the store of a data set. Nothing is created before the first save.
     ///
     /// # Errors
-    /// [`StoreError::NoFolder`] if neither the data set's folder nor the user's data folder can be written.
-    pub fn for_dataset(dataset: &Dataset) -> Result<Self, StoreError> {
+    /// [`FileError`] if neither the data set's folder nor the user's data folder can be written.
+    pub fn for_dataset(dataset: &Dataset) -> Result<Self, FileError> {
         let key = match &dataset.root {
             Some(root) => {
                 // The path is part of the name: data sets often share their last folder's name.
                 let name = root.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-                format!("{}-{}", names::label(&name), short_hash(root))
+                format!("{}-{}", names::label(&name), &sha256(root.as_os_str().as_encoded_bytes())[..12])
             }
             None => names::label(&dataset.title),
         };
@@ -242,7 +190,8 @@ impl MaskStore {
     ///
     /// # Errors
     /// As there.
-    pub fn choose(dataset_root: Option<&Path>, user_folder: Option<PathBuf>) -> Result<Self, StoreError> {
+    pub fn choose(dataset_root: Option<&Path>, user_folder: Option<PathBuf>) -> Result<Self, FileError> {
+        let is_writable = |folder: &Path| atomic::probe(folder).is_ok();
         let beside = dataset_root.map(|root| root.join(FOLDER));
         if let (Some(beside), Some(root)) = (&beside, dataset_root)
             && is_writable(if beside.is_dir() { beside } else { root })
@@ -260,7 +209,8 @@ impl MaskStore {
             }
             tried.push(user.display().to_string());
         }
-        Err(StoreError::NoFolder { tried: tried.join(", ") })
+        let hint = "make one of these folders writable, or set XDG_DATA_HOME to one that is";
+        Err(FileError::new("", format!("no folder for masks can be written; tried {}", tried.join(", ")), hint))
     }
 
     /// A store in a given folder, for the lab's rig.
@@ -296,8 +246,8 @@ impl MaskStore {
     /// Reads a mask; `None` if none was saved.
     ///
     /// # Errors
-    /// [`StoreError::Damaged`]: then the pair must not be edited.
-    pub fn load(&self, pair: &str, finger: PadId) -> Result<Option<StoredMask>, StoreError> {
+    /// [`FileError`]: then the pair must not be edited.
+    pub fn load(&self, pair: &str, finger: PadId) -> Result<Option<StoredMask>, FileError> {
         match self.find(&self.mask_name(pair, finger))? {
             Some((file, bytes)) => parse_mask(&file, &bytes, pair, &self.rig.pad_key(finger)).map(Some),
             None => Ok(None),
@@ -307,16 +257,16 @@ impl MaskStore {
     /// Saves a mask; `None` removes the file (undo back to "never corrected").
     ///
     /// # Errors
-    /// [`StoreError::Damaged`] if the file that is there cannot be understood: it is not overwritten.
-    /// [`StoreError::Io`] if the disk refuses; the previous file is then unchanged.
-    pub fn save(&self, pair: &str, finger: PadId, mask: Option<&StoredMask>) -> Result<(), StoreError> {
+    /// [`FileError`] if the file that is there cannot be understood: it is not overwritten.
+    /// If the disk refuses, the previous file is unchanged.
+    pub fn save(&self, pair: &str, finger: PadId, mask: Option<&StoredMask>) -> Result<(), FileError> {
         self.load(pair, finger)?;
         let file = self.mask_file(pair, finger);
         let Some(stored) = mask else {
             self.at_home()?;
             return match std::fs::remove_file(&file) {
                 Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
-                    Err(StoreError::Io { file, what: "remove the mask", source })
+                    Err(refused(&file, "remove the mask", source))
                 }
                 _ => Ok(()),
             };
@@ -342,9 +292,9 @@ impl MaskStore {
     ///
     /// # Errors
     /// As [`MaskStore::load`].
-    pub fn load_predicted(&self, pair: &str, finger: PadId) -> Result<Vec<(PredictedId, StoredMask)>, StoreError> {
+    pub fn load_predicted(&self, pair: &str, finger: PadId) -> Result<Vec<(PredictedId, StoredMask)>, FileError> {
         let Some((file, bytes)) = self.find(&self.predicted_name(pair, finger))? else { return Ok(Vec::new()) };
-        let damaged = |reason: String| StoreError::Damaged { file: file.clone(), reason };
+        let damaged = |reason: String| damaged(&file, &reason);
         let content: PredictedFile = serde_json::from_slice(&bytes).map_err(|err| damaged(err.to_string()))?;
         check_format(&file, &content.format, PREDICTED_FORMAT, content.version, MASK_VERSION..=MASK_VERSION)?;
         if content.pair != pair || content.finger != self.rig.pad_key(finger) {
@@ -367,7 +317,7 @@ impl MaskStore {
         finger: PadId,
         of: &PredictedId,
         mask: Option<&StoredMask>,
-    ) -> Result<(), StoreError> {
+    ) -> Result<(), FileError> {
         let mut all = self.load_predicted(pair, finger)?;
         all.retain(|(other, _)| other != of);
         all.extend(mask.map(|mask| (of.clone(), mask.clone())));
@@ -395,13 +345,13 @@ impl MaskStore {
     ///
     /// # Errors
     /// As [`MaskStore::load`].
-    pub fn load_review(&self, pair: &str) -> Result<Option<StoredReview>, StoreError> {
+    pub fn load_review(&self, pair: &str) -> Result<Option<StoredReview>, FileError> {
         match self.find(&review_name(pair))? {
             Some((file, bytes)) => parse_review(&file, &bytes).and_then(|content| {
                 if content.pair == pair {
                     Ok(Some(content.review))
                 } else {
-                    Err(StoreError::Damaged { file, reason: format!("it belongs to the pair {}", content.pair) })
+                    Err(damaged(&file, &format!("it belongs to the pair {}", content.pair)))
                 }
             }),
             None => Ok(None),
@@ -412,7 +362,7 @@ impl MaskStore {
     ///
     /// # Errors
     /// As [`MaskStore::save`].
-    pub fn save_review(&self, pair: &str, review: &StoredReview) -> Result<(), StoreError> {
+    pub fn save_review(&self, pair: &str, review: &StoredReview) -> Result<(), FileError> {
         self.load_review(pair)?;
         let (format, version) = (REVIEW_FORMAT.into(), REVIEW_VERSION);
         let content = ReviewFile { format, version, pair: pair.into(), review: review.clone() };
@@ -458,18 +408,14 @@ impl MaskStore {
     }
 
     /// Checks that the data set is still there.
-    fn at_home(&self) -> Result<(), StoreError> {
-        Ok(self.home.as_ref().map_or(Ok(()), DatasetLocation::check)?)
+    fn at_home(&self) -> Result<(), FileError> {
+        self.home.as_ref().map_or(Ok(()), DatasetLocation::check)
     }
 
     /// Makes the folder where it is missing; never the data set's own.
-    fn make_folder(&self, what: &'static str) -> Result<(), StoreError> {
+    fn make_folder(&self, what: &'static str) -> Result<(), FileError> {
         self.at_home()?;
-        std::fs::create_dir_all(&self.folder).map_err(|source| StoreError::Io {
-            file: self.folder.clone(),
-            what,
-            source,
-        })
+        std::fs::create_dir_all(&self.folder).map_err(|err| refused(&self.folder, what, err))
     }
 
     fn folders(&self) -> impl Iterator<Item = &Path> {
@@ -477,7 +423,7 @@ impl MaskStore {
     }
 
     /// The first file of that name, with its content.
-    fn find(&self, name: &str) -> Result<Option<(PathBuf, Vec<u8>)>, StoreError> {
+    fn find(&self, name: &str) -> Result<Option<(PathBuf, Vec<u8>)>, FileError> {
         for folder in self.folders() {
             let file = folder.join(name);
             match files::read(&file, files::SMALL) {
@@ -485,7 +431,7 @@ impl MaskStore {
                 Err(err) if err.kind() == std::io::ErrorKind::NotFound => {}
                 // The folder's name is taken by a file: nothing was saved there.
                 Err(err) if err.kind() == std::io::ErrorKind::NotADirectory => {}
-                Err(source) => return Err(StoreError::Io { file, what: "read the stored labels", source }),
+                Err(err) => return Err(refused(&file, READ, err)),
             }
         }
         Ok(None)
@@ -504,8 +450,8 @@ impl MaskStore {
         files
     }
 
-    fn write(&self, file: &Path, content: &impl Serialize) -> Result<(), StoreError> {
-        let io = |source| StoreError::Io { file: file.to_owned(), what: "save the labels", source };
+    fn write(&self, file: &Path, content: &impl Serialize) -> Result<(), FileError> {
+        let io = |err| refused(file, "save the labels", err);
         self.make_folder("save the labels")?;
         let mut bytes = serde_json::to_vec(content).map_err(|err| io(err.into()))?;
         bytes.push(b'\n');
@@ -513,20 +459,29 @@ impl MaskStore {
     }
 }
 
+const READ: &str = "read the stored labels";
+
+pub(super) fn refused(file: &Path, what: &str, err: std::io::Error) -> FileError {
+    let hint = "check the permissions and the free space of the disk";
+    FileError { hint, ..FileError::io(file, &format!("cannot {what}"), err) }
+}
+
+/// The error of a file that cannot be understood: it is left as it is, and its pair must not be edited.
+fn damaged(file: &Path, reason: &str) -> FileError {
+    let what = format!("the stored labels cannot be read, so this pair cannot be edited: {reason}");
+    FileError::new(file, what, "restore the file from a backup, or move it away to start this mask anew")
+}
+
 fn review_name(pair: &str) -> String {
     format!("{}{REVIEW_SUFFIX}", names::label(pair))
 }
 
-fn read(file: &Path) -> Result<Vec<u8>, StoreError> {
-    files::read(file, files::SMALL).map_err(|source| StoreError::Io {
-        file: file.to_owned(),
-        what: "read the stored labels",
-        source,
-    })
+fn read(file: &Path) -> Result<Vec<u8>, FileError> {
+    files::read(file, files::SMALL).map_err(|err| refused(file, READ, err))
 }
 
-fn parse_mask(file: &Path, bytes: &[u8], pair: &str, finger: &str) -> Result<StoredMask, StoreError> {
-    let damaged = |reason: String| StoreError::Damaged { file: file.to_owned(), reason };
+fn parse_mask(file: &Path, bytes: &[u8], pair: &str, finger: &str) -> Result<StoredMask, FileError> {
+    let damaged = |reason: String| damaged(file, &reason);
     let content: MaskFile = serde_json::from_slice(bytes).map_err(|err| damaged(err.to_string()))?;
     check_format(file, &content.format, FORMAT, content.version, MASK_VERSION..=MASK_VERSION)?;
     if content.pair != pair || content.finger != finger {
@@ -544,13 +499,11 @@ fn contact_px(mask: &Mask) -> usize {
     mask.as_slice().iter().filter(|&&v| v).count()
 }
 
-fn parse_review(file: &Path, bytes: &[u8]) -> Result<ReviewFile, StoreError> {
-    let content: ReviewFile = serde_json::from_slice(bytes)
-        .map_err(|err| StoreError::Damaged { file: file.to_owned(), reason: err.to_string() })?;
+fn parse_review(file: &Path, bytes: &[u8]) -> Result<ReviewFile, FileError> {
+    let content: ReviewFile = serde_json::from_slice(bytes).map_err(|err| damaged(file, &err.to_string()))?;
     check_format(file, &content.format, REVIEW_FORMAT, content.version, 1..=REVIEW_VERSION)?;
     if content.review.accepted.values().any(|a| !a.pose.is_finite()) {
-        let reason = "an accepted pose is not a finite number".into();
-        return Err(StoreError::Damaged { file: file.to_owned(), reason });
+        return Err(damaged(file, "an accepted pose is not a finite number"));
     }
     Ok(content)
 }
@@ -561,20 +514,10 @@ fn check_format(
     expected: &str,
     version: u32,
     known: RangeInclusive<u32>,
-) -> Result<(), StoreError> {
+) -> Result<(), FileError> {
     if format == expected && known.contains(&version) {
         return Ok(());
     }
     let reason = format!("it is {format} version {version}, expected {expected} up to version {}", known.end());
-    Err(StoreError::Damaged { file: file.to_owned(), reason })
-}
-
-fn is_writable(folder: &Path) -> bool {
-    atomic::probe(folder).is_ok()
-}
-
-fn short_hash(path: &Path) -> String {
-    use sha2::Digest as _;
-    let digest = sha2::Sha256::digest(path.as_os_str().as_encoded_bytes());
-    digest[..6].iter().map(|b| format!("{b:02x}")).collect()
+    Err(damaged(file, &reason))
 }

@@ -7,6 +7,8 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use super::error::FileError;
+
 /// Part of the name of every file that is written beside a touch; such files are never taken for touches.
 pub const OUTPUT_MARK: &str = ".t2t.";
 
@@ -62,12 +64,6 @@ pub fn output(pair: &str) -> String {
     shortened(out, pair, LONGEST_OUTPUT)
 }
 
-/// The pair behind [`output`]; `None` for shortened names and for what it never returns.
-pub fn pair_of_output(stem: &str) -> Option<String> {
-    let pair = unescaped(&stem.replace("__", "/"))?;
-    (output(&pair) == stem).then_some(pair)
-}
-
 fn push_escaped(out: &mut String, byte: u8) {
     out.push_str(&format!("%{byte:02x}"));
 }
@@ -104,22 +100,6 @@ pub fn with_ending(stem: &Path, ending: &str) -> PathBuf {
     stem.with_file_name(name)
 }
 
-/// Two pairs whose files would be the same.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "the files of the pairs {first:?} and {second:?} would be the same in this folder, which does not tell capitals \
-     from small letters; write to another disk, or rename one of the pairs ({})",
-    folder.display()
-)]
-pub struct Clash {
-    /// The folder of the outputs.
-    pub folder: PathBuf,
-    /// The pair that has the name.
-    pub first: String,
-    /// The pair that would take it.
-    pub second: String,
-}
-
 /// The names of the outputs in one folder, each given to one pair only.
 #[derive(Debug)]
 pub struct Outputs {
@@ -135,9 +115,10 @@ impl Outputs {
     ///
     /// # Errors
     /// Whatever the disk says.
-    pub fn new(folder: &Path) -> std::io::Result<Self> {
-        std::fs::create_dir_all(folder)?;
-        let probe = super::atomic::probe(folder)?;
+    pub fn new(folder: &Path) -> Result<Self, FileError> {
+        let io = |err| FileError::io(folder, "cannot write to the output folder", err);
+        std::fs::create_dir_all(folder).map_err(io)?;
+        let probe = super::atomic::probe(folder).map_err(io)?;
         let name = probe.path().file_name().map(|name| name.to_string_lossy().to_uppercase()).unwrap_or_default();
         let folds_case = folder.join(name).exists();
         Ok(Self { folder: folder.to_owned(), folds_case, given: BTreeMap::new() })
@@ -146,13 +127,17 @@ impl Outputs {
     /// The path, without an ending, of the files of `pair`.
     ///
     /// # Errors
-    /// [`Clash`] if another pair has it.
-    pub fn stem(&mut self, pair: &str) -> Result<PathBuf, Clash> {
+    /// [`FileError`] if another pair has it.
+    pub fn stem(&mut self, pair: &str) -> Result<PathBuf, FileError> {
         let name = output(pair);
         let seen = if self.folds_case { name.to_lowercase() } else { name.clone() };
         let first = self.given.entry(seen).or_insert_with(|| pair.to_owned());
         if first != pair {
-            return Err(Clash { folder: self.folder.clone(), first: first.clone(), second: pair.to_owned() });
+            let what = format!(
+                "the files of the pairs {first:?} and {pair:?} would be the same in this folder, which does not tell capitals \
+                 from small letters; write to another disk, or rename one of the pairs"
+            );
+            return Err(FileError::new(&self.folder, what, ""));
         }
         Ok(self.folder.join(name))
     }
@@ -162,6 +147,12 @@ impl Outputs {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    /// The pair behind [`output`]; `None` for shortened names and for what it never returns.
+    fn pair_of_output(stem: &str) -> Option<String> {
+        let pair = unescaped(&stem.replace("__", "/"))?;
+        (output(&pair) == stem).then_some(pair)
+    }
 
     #[test]
     fn names_that_look_alike_stay_apart() {

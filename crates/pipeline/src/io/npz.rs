@@ -4,59 +4,39 @@ mod npy;
 
 use std::collections::BTreeMap;
 use std::io::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
+use super::error::FileError;
 use super::pt::{Tensor, Values};
 use super::{archive, atomic, files};
 use touch2touch_core::grid::{Grid, RgbGrid};
 
-/// Why an `.npz` file cannot be read.
-#[derive(Debug, thiserror::Error)]
-pub enum NpzError {
-    /// The file cannot be opened.
-    #[error("cannot read or write the file ({}): {source}", file.display())]
-    Io {
-        /// The file.
-        file: PathBuf,
-        /// The system's reason.
-        source: std::io::Error,
-    },
-    /// Not a zip archive, or a damaged one.
-    #[error("not a readable .npz archive: {reason} ({})", file.display())]
-    Archive {
-        /// The file.
-        file: PathBuf,
-        /// Reason, as the message ends.
-        reason: String,
-    },
-    /// An array that cannot be read.
-    #[error("array \"{name}\" cannot be read: {reason} ({})", file.display())]
-    Array {
-        /// The file.
-        file: PathBuf,
-        /// The array's name.
-        name: String,
-        /// Reason, as the message ends.
-        reason: String,
-    },
+const SAVE_AGAIN: &str = "save it again with numpy";
+
+fn io(file: &Path, err: std::io::Error) -> FileError {
+    FileError::io(file, "cannot read or write the file", err)
+}
+
+fn bad_array(file: &Path, name: &str, reason: String) -> FileError {
+    FileError::new(file, format!("array \"{name}\" cannot be read: {reason}"), SAVE_AGAIN)
 }
 
 /// Writes an image as numpy's `.npy`: `f32`, shape `(height, width)`, row-major.
 ///
 /// # Errors
-/// [`NpzError::Io`] if the file cannot be written.
-pub fn write_npy(file: &Path, image: &Grid<f32>) -> Result<(), NpzError> {
+/// [`FileError`] if the file cannot be written.
+pub fn write_npy(file: &Path, image: &Grid<f32>) -> Result<(), FileError> {
     write_values(file, &[image.height(), image.width()], Values::F32(image.as_slice().to_vec()))
 }
 
 /// Reads a `.npy` file of numbers, row-major. Integers other than `u8` become `i64`.
 ///
 /// # Errors
-/// [`NpzError`].
-pub fn read_npy(file: &Path) -> Result<Tensor, NpzError> {
-    let io = |source| NpzError::Io { file: file.to_owned(), source };
+/// [`FileError`].
+pub fn read_npy(file: &Path) -> Result<Tensor, FileError> {
+    let io = |err| io(file, err);
     let name = file.file_stem().map(|name| files::clip(&name.to_string_lossy())).unwrap_or_default();
-    let failed = |reason| NpzError::Array { file: file.to_owned(), name: name.clone(), reason };
+    let failed = |reason| bad_array(file, &name, reason);
     let opened = files::open(file).map_err(io)?;
     let size = opened.metadata().map_err(io)?.len();
     let mut from = std::io::BufReader::new(opened);
@@ -67,33 +47,26 @@ pub fn read_npy(file: &Path) -> Result<Tensor, NpzError> {
 /// Writes the planes of a color picture as `.npy`: f32, 3 x height x width.
 ///
 /// # Errors
-/// [`NpzError::Io`] if the file cannot be written.
-pub fn write_npy_planes(file: &Path, picture: &RgbGrid) -> Result<(), NpzError> {
+/// [`FileError`] if the file cannot be written.
+pub fn write_npy_planes(file: &Path, picture: &RgbGrid) -> Result<(), FileError> {
     let values = (0..3).flat_map(|c| picture.as_slice().iter().map(move |pixel| pixel[c])).collect();
     write_values(file, &[3, picture.height(), picture.width()], Values::F32(values))
 }
 
-fn write_values(file: &Path, shape: &[usize], values: Values) -> Result<(), NpzError> {
+fn write_values(file: &Path, shape: &[usize], values: Values) -> Result<(), FileError> {
     let bytes = npy::bytes(shape, &values);
-    atomic::write_bytes(file, &bytes).map_err(|source| NpzError::Io { file: file.to_owned(), source })
+    atomic::write_bytes(file, &bytes).map_err(|err| io(file, err))
 }
 
 /// Writes arrays of numbers under their names, compressed, row-major.
 ///
 /// # Errors
-/// [`NpzError::Array`] if an array's shape and values disagree, [`NpzError::Io`] if the file cannot be written.
-pub fn write(path: &Path, arrays: &[(&str, Tensor)]) -> Result<(), NpzError> {
+/// [`FileError`] if an array's shape and values disagree, or if the file cannot be written.
+pub fn write(path: &Path, arrays: &[(&str, Tensor)]) -> Result<(), FileError> {
     for (name, tensor) in arrays {
-        let shape = &tensor.shape;
-        let len = match &tensor.values {
-            Values::F32(v) => v.len(),
-            Values::F64(v) => v.len(),
-            Values::U8(v) => v.len(),
-            Values::I64(v) => v.len(),
-        };
+        let (shape, len) = (&tensor.shape, tensor.values.len());
         if shape.iter().product::<usize>() != len {
-            let reason = format!("{len} values do not fill the shape {shape:?}");
-            return Err(NpzError::Array { file: path.to_owned(), name: (*name).to_owned(), reason });
+            return Err(bad_array(path, name, format!("{len} values do not fill the shape {shape:?}")));
         }
     }
     archive::write(path, |zip| {
@@ -103,7 +76,7 @@ pub fn write(path: &Path, arrays: &[(&str, Tensor)]) -> Result<(), NpzError> {
         }
         Ok(())
     })
-    .map_err(|source| NpzError::Io { file: path.to_owned(), source })
+    .map_err(|err| io(path, err))
 }
 
 /// Most values of all arrays of a file together: two cameras' images at 1920 x 1080, four of each.
@@ -114,9 +87,9 @@ const MAX_ARRAYS: usize = 1000;
 /// Reads all arrays of numbers, row-major, by name. Integers other than `u8` become `i64`.
 ///
 /// # Errors
-/// [`NpzError`]; arrays of other things than numbers (texts, objects) are errors too.
-pub fn read(path: &Path) -> Result<BTreeMap<String, Tensor>, NpzError> {
-    let file = files::open(path).map_err(|source| NpzError::Io { file: path.to_owned(), source })?;
+/// [`FileError`]; arrays of other things than numbers (texts, objects) are errors too.
+pub fn read(path: &Path) -> Result<BTreeMap<String, Tensor>, FileError> {
+    let file = files::open(path).map_err(|err| io(path, err))?;
     read_from(path, std::io::BufReader::new(file))
 }
 
@@ -124,12 +97,14 @@ pub fn read(path: &Path) -> Result<BTreeMap<String, Tensor>, NpzError> {
 ///
 /// # Errors
 /// As [`read`].
-pub(crate) fn read_bytes(path: &Path, bytes: &[u8]) -> Result<BTreeMap<String, Tensor>, NpzError> {
+pub(crate) fn read_bytes(path: &Path, bytes: &[u8]) -> Result<BTreeMap<String, Tensor>, FileError> {
     read_from(path, std::io::Cursor::new(bytes))
 }
 
-fn read_from(path: &Path, file: impl std::io::Read + std::io::Seek) -> Result<BTreeMap<String, Tensor>, NpzError> {
-    let archive = |reason: String| NpzError::Archive { file: path.to_owned(), reason: files::clip(&reason) };
+fn read_from(path: &Path, file: impl std::io::Read + std::io::Seek) -> Result<BTreeMap<String, Tensor>, FileError> {
+    let archive = |reason: String| {
+        FileError::new(path, format!("not a readable .npz archive: {}", files::clip(&reason)), SAVE_AGAIN)
+    };
     let mut zip = zip::ZipArchive::new(file).map_err(|err| archive(err.to_string()))?;
     if zip.len() > MAX_ARRAYS {
         return Err(archive(format!("it has {} entries; at most {MAX_ARRAYS} are read", zip.len())));
@@ -141,7 +116,7 @@ fn read_from(path: &Path, file: impl std::io::Read + std::io::Seek) -> Result<BT
         let Some(name) = String::from_utf8_lossy(entry.name_raw()).strip_suffix(".npy").map(str::to_owned) else {
             continue;
         };
-        let failed = |reason: String| NpzError::Array { file: path.to_owned(), name: files::clip(&name), reason };
+        let failed = |reason| bad_array(path, &files::clip(&name), reason);
         let size = entry.size();
         let header = npy::header(&mut entry, room).map_err(failed)?;
         room -= header.count;

@@ -4,7 +4,6 @@
 //! ([`PtDict::row`]), which lies where offset and strides say, however large the file is. [`write_dict`] is a small writer of
 //! the same container that `torch.load(weights_only=True)` accepts.
 
-mod error;
 mod pickle;
 mod write;
 
@@ -18,9 +17,9 @@ use zip::read::{ArchiveOffset, Config};
 use zip::{CompressionMethod, ZipArchive};
 
 use self::pickle::{Item, Place, Refusal, contents};
-pub use error::PtError;
 pub use write::{PtItem, write_dict};
 
+use super::error::{FileError, FileErrorKind};
 use super::files::{self, clip};
 
 /// Most bytes of the pickle itself. A dict of the twelve tensors of a touch has two thousand.
@@ -95,6 +94,27 @@ impl Tensor {
     }
 }
 
+impl Values {
+    pub(super) fn len(&self) -> usize {
+        match self {
+            Self::F32(v) => v.len(),
+            Self::F64(v) => v.len(),
+            Self::U8(v) => v.len(),
+            Self::I64(v) => v.len(),
+        }
+    }
+
+    /// The values one after the other, the lowest byte first.
+    pub(super) fn bytes(&self) -> Vec<u8> {
+        match self {
+            Self::F32(v) => v.iter().flat_map(|x| x.to_le_bytes()).collect(),
+            Self::F64(v) => v.iter().flat_map(|x| x.to_le_bytes()).collect(),
+            Self::U8(v) => v.clone(),
+            Self::I64(v) => v.iter().flat_map(|x| x.to_le_bytes()).collect(),
+        }
+    }
+}
+
 /// Type of the values of a storage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum DType {
@@ -133,12 +153,15 @@ pub struct PtDict {
 /// Opens `path` and reads the names and shapes of its tensors, not their values.
 ///
 /// # Errors
-/// [`PtError`] if the file cannot be read, is cut off, or does not hold a dict in the format of PyTorch 1.6 and newer.
-pub fn read_dict(path: &Path) -> Result<PtDict, PtError> {
-    let file = || path.to_owned();
-    let io = |source| PtError::Io { file: file(), what: "cannot open the file", source };
-    let not_a_dict = |reason: &str| PtError::NotADict { file: file(), reason: reason.into() };
-    let damaged = |reason: String| PtError::Damaged { file: file(), reason: clip(&reason) };
+/// [`FileError`] if the file cannot be read, is cut off, or does not hold a dict in the format of PyTorch 1.6 and newer.
+pub fn read_dict(path: &Path) -> Result<PtDict, FileError> {
+    let io = |err| FileError::io(path, "cannot open the file", err);
+    let not_a_dict = |reason: &str| {
+        let what = format!("not a PyTorch file with a dict of tensors: {reason}");
+        FileError::new(path, what, "save a dict of tensors with torch.save")
+    };
+    let damaged =
+        |reason: String| FileError::new(path, format!("damaged or truncated file: {}", clip(&reason)), COPY_AGAIN);
     let mut opened = match files::open(path) {
         Err(err) if err.kind() == std::io::ErrorKind::IsADirectory => return Err(not_a_dict("it is a folder")),
         other => other.map_err(io)?,
@@ -159,16 +182,15 @@ pub fn read_dict(path: &Path) -> Result<PtDict, PtError> {
     let entry = archive.by_name(&name).map_err(|err| damaged(err.to_string()))?;
     let mut pickle = Vec::new();
     entry.take(MAX_PICKLE + 1).read_to_end(&mut pickle).map_err(|err| damaged(err.to_string()))?;
-    let too_large = |reason| PtError::TooLarge { file: file(), reason };
     if pickle.len() as u64 > MAX_PICKLE {
-        return Err(too_large(format!("its list of contents is longer than {MAX_PICKLE} bytes")));
+        return Err(too_large(path, &format!("its list of contents is longer than {MAX_PICKLE} bytes")));
     }
     let items = contents(&pickle).map_err(|refusal| match refusal {
         Refusal::NoDict => not_a_dict("its list of contents is no dict that torch.save writes"),
-        Refusal::TooLarge(reason) => too_large(reason),
+        Refusal::TooLarge(reason) => too_large(path, &reason),
     })?;
     let root = name.trim_end_matches("data.pkl").to_owned();
-    Ok(PtDict { file: file(), archive: RefCell::new(archive), root, items })
+    Ok(PtDict { file: path.to_owned(), archive: RefCell::new(archive), root, items })
 }
 
 impl PtDict {
@@ -204,21 +226,19 @@ impl PtDict {
     /// Reads the tensor under `key`; a plain Python number counts as a 0-dimensional tensor.
     ///
     /// # Errors
-    /// [`PtError::MissingKey`], [`PtError::NotATensor`] (numpy values among them), [`PtError::BadStorage`].
-    pub fn tensor(&self, key: &str) -> Result<Tensor, PtError> {
+    /// [`FileErrorKind::Missing`] where there is none, or another value (numpy's among them); else its values cannot be read.
+    pub fn tensor(&self, key: &str) -> Result<Tensor, FileError> {
         match self.items.get(key) {
             Some(Item::Tensor(place)) => self.whole(key, place),
             Some(Item::Float(x)) => Ok(Tensor::f64(&[], vec![*x])),
             Some(Item::Int(x)) => Ok(Tensor { shape: vec![], values: Values::I64(vec![*x]) }),
             Some(Item::Bool(x)) => Ok(Tensor::u8(&[], vec![u8::from(*x)])),
-            Some(Item::Other(found)) => {
-                Err(PtError::NotATensor { file: self.file.clone(), key: key.into(), found: clip(found) })
-            }
+            Some(Item::Other(found)) => Err(self.no_tensor(key, &clip(found))),
             None => Err(self.missing(key)),
         }
     }
 
-    fn whole(&self, key: &str, Place { storage, dtype, offset, shape, strides }: &Place) -> Result<Tensor, PtError> {
+    fn whole(&self, key: &str, Place { storage, dtype, offset, shape, strides }: &Place) -> Result<Tensor, FileError> {
         let bad = |reason: String| self.bad(key, reason);
         // A view can repeat one value of the file for ever.
         let values = product(shape);
@@ -249,8 +269,8 @@ impl PtDict {
     /// Row `at` of the tensor under `key`, which must have this many rows (or one row for all) of this shape.
     ///
     /// # Errors
-    /// [`PtError`], before anything is allocated where a size is wrong.
-    pub(crate) fn row(&self, key: &str, at: usize, of: usize, row: &[usize]) -> Result<Tensor, PtError> {
+    /// [`FileError`], before anything is allocated where a size is wrong.
+    pub(crate) fn row(&self, key: &str, at: usize, of: usize, row: &[usize]) -> Result<Tensor, FileError> {
         let start = self.check(key, of, row)?;
         let Some(place) = self.place(key) else { return Err(self.missing(key)) };
         let at = if place.shape[0] == 1 { 0 } else { at.min(place.shape[0] - 1) };
@@ -268,7 +288,7 @@ impl PtDict {
     ///
     /// # Errors
     /// As there.
-    pub(crate) fn check(&self, key: &str, of: usize, row: &[usize]) -> Result<u64, PtError> {
+    pub(crate) fn check(&self, key: &str, of: usize, row: &[usize]) -> Result<u64, FileError> {
         let Some(place) = self.place(key) else { return Err(self.missing(key)) };
         let bad = |reason: String| self.bad(key, reason);
         let shape = place.shape.as_slice();
@@ -297,20 +317,28 @@ impl PtDict {
         format!("{}data/{key}", self.root)
     }
 
-    fn bad(&self, key: &str, reason: String) -> PtError {
-        PtError::BadStorage { file: self.file.clone(), key: key.into(), reason }
+    fn bad(&self, key: &str, reason: String) -> FileError {
+        FileError::new(&self.file, format!("key \"{key}\" cannot be read: {reason}"), COPY_AGAIN)
     }
 
-    fn missing(&self, key: &str) -> PtError {
+    fn missing(&self, key: &str) -> FileError {
         let found: Vec<&str> = self.items.keys().map(String::as_str).collect();
-        PtError::MissingKey { file: self.file.clone(), key: key.into(), found: clip(&found.join(", ")) }
+        let what = format!("key \"{key}\" is missing; found {}", clip(&found.join(", ")));
+        let hint = "check that the file belongs to this folder and to the released data set";
+        FileError::new(&self.file, what, hint).of_kind(FileErrorKind::Missing)
+    }
+
+    fn no_tensor(&self, key: &str, found: &str) -> FileError {
+        let hint = "convert the value with torch.as_tensor(...) before torch.save";
+        FileError::new(&self.file, format!("key \"{key}\" holds {found}, expected a tensor"), hint)
+            .of_kind(FileErrorKind::Missing)
     }
 
     /// Reads the tensor under `key`, which must have one of `shapes`, as 32-bit floats.
     ///
     /// # Errors
-    /// As [`PtDict::tensor`], and [`PtError::WrongShape`], which is found before the values are read.
-    pub fn f32s(&self, key: &str, shapes: &[&[usize]]) -> Result<Vec<f32>, PtError> {
+    /// As [`PtDict::tensor`], and [`FileErrorKind::Content`] of another shape, which is found before the values are read.
+    pub fn f32s(&self, key: &str, shapes: &[&[usize]]) -> Result<Vec<f32>, FileError> {
         Ok(self.shaped(key, shapes)?.into_f32())
     }
 
@@ -318,7 +346,7 @@ impl PtDict {
     ///
     /// # Errors
     /// As [`PtDict::f32s`].
-    pub(crate) fn f64s(&self, key: &str, shapes: &[&[usize]]) -> Result<Vec<f64>, PtError> {
+    pub(crate) fn f64s(&self, key: &str, shapes: &[&[usize]]) -> Result<Vec<f64>, FileError> {
         Ok(self.shaped(key, shapes)?.into_f64())
     }
 
@@ -326,7 +354,7 @@ impl PtDict {
     ///
     /// # Errors
     /// As [`PtDict::f32s`].
-    pub fn scalar(&self, key: &str) -> Result<f64, PtError> {
+    pub fn scalar(&self, key: &str) -> Result<f64, FileError> {
         let tensor = match self.shape(key) {
             Some(shape) if shape.iter().any(|&n| n != 1) => {
                 return Err(self.wrong_shape(key, shape, "a single number".into()));
@@ -338,7 +366,7 @@ impl PtDict {
     }
 
     /// The tensor under `key`, which must have one of `shapes`: found out before its values are read.
-    fn shaped(&self, key: &str, shapes: &[&[usize]]) -> Result<Tensor, PtError> {
+    fn shaped(&self, key: &str, shapes: &[&[usize]]) -> Result<Tensor, FileError> {
         let accepts = |shape: &[usize]| shapes.contains(&shape);
         let expected = || shapes.iter().map(|s| format!("{s:?}")).collect::<Vec<_>>().join(" or ");
         match self.shape(key) {
@@ -350,15 +378,23 @@ impl PtDict {
                 if accepts(&number.shape) {
                     return Ok(number);
                 }
-                let found = format!("a plain number where a tensor of shape {} belongs", expected());
-                Err(PtError::NotATensor { file: self.file.clone(), key: key.into(), found })
+                Err(self.no_tensor(key, &format!("a plain number where a tensor of shape {} belongs", expected())))
             }
         }
     }
 
-    fn wrong_shape(&self, key: &str, found: &[usize], expected: String) -> PtError {
-        PtError::WrongShape { file: self.file.clone(), key: key.into(), found: found.to_vec(), expected }
+    fn wrong_shape(&self, key: &str, found: &[usize], expected: String) -> FileError {
+        let what = format!("key \"{key}\" has shape {found:?}, expected {expected}");
+        FileError::new(&self.file, what, "check which version of the data set the file belongs to")
+            .of_kind(FileErrorKind::Content)
     }
+}
+
+const COPY_AGAIN: &str = "copy or download the file again";
+
+pub(super) fn too_large(path: &Path, reason: &str) -> FileError {
+    let hint = "save the tensors of one touch only, uncompressed, with torch.save";
+    FileError::new(path, format!("refused: {reason}"), hint)
 }
 
 /// The number of values of a shape.

@@ -10,8 +10,9 @@ use std::path::{Path, PathBuf};
 
 use glam::{DAffine3, DQuat, DVec3};
 
-use super::pt::{PtError, PtItem, Tensor, write_dict};
-use super::stl::{self, MeshError};
+use super::error::FileError;
+use super::pt::{PtItem, Tensor, write_dict};
+use super::stl;
 use touch2touch_core::frames::{PlanarPose, xyz_quat_from_affine};
 use touch2touch_core::grid::{DepthMap, RgbGrid};
 use touch2touch_core::mesh::TriMesh;
@@ -36,53 +37,6 @@ pub enum Layout {
     GelslimDepth,
 }
 
-/// Why a touch cannot be written.
-#[derive(Debug, thiserror::Error)]
-pub enum WriteError {
-    /// A `.pt` file.
-    #[error(transparent)]
-    Pt(#[from] PtError),
-    /// A CAD model.
-    #[error(transparent)]
-    Mesh(#[from] MeshError),
-    /// A folder cannot be made.
-    #[error("cannot make the folder ({}): {source}", folder.display())]
-    Folder {
-        /// The folder.
-        folder: PathBuf,
-        /// The system's reason.
-        source: std::io::Error,
-    },
-    /// The sample lacks something that the lab's files have, or has another size.
-    #[error("the sample has no {missing}, which the lab's files need")]
-    Incomplete {
-        /// Part that is missing.
-        missing: &'static str,
-    },
-    /// The manifest cannot be written.
-    #[error("cannot write the manifest ({}): {source}", file.display())]
-    Manifest {
-        /// The file.
-        file: PathBuf,
-        /// The system's reason.
-        source: std::io::Error,
-    },
-    /// The folder holds something else.
-    #[error("the folder holds {found}, which was not written by the same command; choose a new folder ({})", folder.display())]
-    NotOurs {
-        /// The folder.
-        folder: PathBuf,
-        /// Content of the folder.
-        found: String,
-    },
-    /// A tool whose name cannot be a file name.
-    #[error("{name:?} cannot name a tool's files; use letters, digits, - and _")]
-    ToolName {
-        /// The name.
-        name: String,
-    },
-}
-
 /// The paths of one pair's GelSlim and bubble file; of [`Layout::GelslimDepth`] the one file of its tool.
 pub fn pair_paths(root: &Path, layout: Layout, tool: &str, index: u64) -> [PathBuf; 2] {
     let in_group = |group: &str| {
@@ -105,7 +59,7 @@ pub fn pair_paths(root: &Path, layout: Layout, tool: &str, index: u64) -> [PathB
 /// Writes both halves of a pair; returns their paths (GelSlim, bubble). Existing files are replaced.
 ///
 /// # Errors
-/// [`WriteError::Incomplete`] unless the sample has both fingers, both sensors (GelSlim with raw and reference
+/// [`FileError`] unless the sample has both fingers, both sensors (GelSlim with raw and reference
 /// image), cameras and a pose, at the lab's image sizes.
 pub fn write_pair(
     root: &Path,
@@ -113,7 +67,7 @@ pub fn write_pair(
     tool: &str,
     index: u64,
     sample: &Sample,
-) -> Result<[PathBuf; 2], WriteError> {
+) -> Result<[PathBuf; 2], FileError> {
     check_name(tool)?;
     let [gelslim_items, bubble_items] = pair_items(sample)?;
     let paths = pair_paths(root, layout, tool, index);
@@ -127,13 +81,13 @@ pub fn write_pair(
 /// Writes the tools' CAD models to `tools_stls` and their split to `tools.pt`: name, seen in training, mesh.
 ///
 /// # Errors
-/// [`WriteError`].
-pub fn write_tools(root: &Path, tools: &[(&str, bool, TriMesh)]) -> Result<(), WriteError> {
+/// [`FileError`].
+pub fn write_tools(root: &Path, tools: &[(&str, bool, TriMesh)]) -> Result<(), FileError> {
     write_models(root, tools)?;
     write_split(root, tools.iter().map(|(name, seen, _)| (*name, *seen)))
 }
 
-fn write_models(root: &Path, tools: &[(&str, bool, TriMesh)]) -> Result<(), WriteError> {
+fn write_models(root: &Path, tools: &[(&str, bool, TriMesh)]) -> Result<(), FileError> {
     for (name, _, mesh) in tools {
         check_name(name)?;
         let path = root.join("tools_stls").join(format!("{name}.stl"));
@@ -143,7 +97,7 @@ fn write_models(root: &Path, tools: &[(&str, bool, TriMesh)]) -> Result<(), Writ
     Ok(())
 }
 
-fn write_split<'a>(root: &Path, tools: impl Iterator<Item = (&'a str, bool)> + Clone) -> Result<(), WriteError> {
+fn write_split<'a>(root: &Path, tools: impl Iterator<Item = (&'a str, bool)> + Clone) -> Result<(), FileError> {
     let names = |seen: bool| PtItem::Texts(tools.clone().filter(|t| t.1 == seen).map(|t| t.0.to_owned()).collect());
     let path = root.join("tools.pt");
     make_parent(&path)?;
@@ -151,17 +105,22 @@ fn write_split<'a>(root: &Path, tools: impl Iterator<Item = (&'a str, bool)> + C
     Ok(())
 }
 
-fn check_name(name: &str) -> Result<(), WriteError> {
+fn incomplete(missing: &str) -> FileError {
+    FileError::new("", format!("the sample has no {missing}, which the lab's files need"), "simulate it again")
+}
+
+fn check_name(name: &str) -> Result<(), FileError> {
     let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
     if name.is_empty() || !name.chars().all(plain) {
-        return Err(WriteError::ToolName { name: name.into() });
+        let what = format!("{name:?} cannot name a tool's files; use letters, digits, - and _");
+        return Err(FileError::new("", what, "rename the tool"));
     }
     Ok(())
 }
 
-fn make_parent(path: &Path) -> Result<(), WriteError> {
+fn make_parent(path: &Path) -> Result<(), FileError> {
     let folder = path.parent().unwrap_or(Path::new(""));
-    std::fs::create_dir_all(folder).map_err(|source| WriteError::Folder { folder: folder.to_owned(), source })
+    std::fs::create_dir_all(folder).map_err(|err| FileError::io(folder, "cannot make the folder", err))
 }
 
 /// Frame of the simulated gripper in the arm's base frame: any place does, as only relative poses count; this one has
@@ -178,18 +137,17 @@ fn frames(frames: &[DAffine3]) -> Vec<f32> {
 
 type Items = Vec<(&'static str, PtItem)>;
 
-fn pair_items(sample: &Sample) -> Result<[Items; 2], WriteError> {
-    let incomplete = |missing| WriteError::Incomplete { missing };
-    let grasp_from_object = sample.grasp_from_object.ok_or(incomplete("true pose"))?;
+fn pair_items(sample: &Sample) -> Result<[Items; 2], FileError> {
+    let grasp_from_object = sample.grasp_from_object.ok_or_else(|| incomplete("true pose"))?;
     let PlanarPose { theta_rad, y_m, z_m } = grasp_from_object.inverse();
     let base_from_grasp = base_from_grasp();
 
     let (mut imprint, mut reference, mut contact, mut clean) = (vec![], vec![], vec![], vec![]);
     let (mut k, mut base_from_cameras, mut raw, mut untouched) = (vec![], vec![], vec![], vec![]);
     for finger in lab::PADS {
-        let touch = sample.pad(finger).ok_or(incomplete("second finger"))?;
-        let bubble_touch = touch.depth().ok_or(incomplete("bubble touch"))?;
-        let camera = bubble_touch.camera.as_ref().ok_or(incomplete("bubble camera"))?;
+        let touch = sample.pad(finger).ok_or_else(|| incomplete("second finger"))?;
+        let bubble_touch = touch.depth().ok_or_else(|| incomplete("bubble touch"))?;
+        let camera = bubble_touch.camera.as_ref().ok_or_else(|| incomplete("bubble camera"))?;
         push_depth(&mut imprint, &bubble_touch.imprint)?;
         push_depth(&mut reference, &camera.depth_reference)?;
         if let Some(truth) = &bubble_touch.truth {
@@ -199,7 +157,7 @@ fn pair_items(sample: &Sample) -> Result<[Items; 2], WriteError> {
         let i = camera.intrinsics;
         k.extend([i.fx, 0.0, i.cx, 0.0, i.fy, i.cy, 0.0, 0.0, 1.0].map(|v| v as f32));
         base_from_cameras.push(base_from_grasp * camera.grasp_from_camera);
-        let images = touch.color().and_then(|g| g.images.as_ref()).ok_or(incomplete("GelSlim images"))?;
+        let images = touch.color().and_then(|g| g.images.as_ref()).ok_or_else(|| incomplete("GelSlim images"))?;
         push_planes(&mut raw, &images.raw)?;
         push_planes(&mut untouched, &images.reference)?;
     }
@@ -235,17 +193,17 @@ fn pair_items(sample: &Sample) -> Result<[Items; 2], WriteError> {
     Ok([gelslim_items, bubble_items])
 }
 
-fn push_depth(out: &mut Vec<f32>, map: &DepthMap) -> Result<(), WriteError> {
+fn push_depth(out: &mut Vec<f32>, map: &DepthMap) -> Result<(), FileError> {
     if map.size() != [lab::BUBBLE.width, lab::BUBBLE.height] {
-        return Err(WriteError::Incomplete { missing: "bubble image of 175 x 140 pixels" });
+        return Err(incomplete("bubble image of 175 x 140 pixels"));
     }
     out.extend(map.as_slice());
     Ok(())
 }
 
-fn push_planes(out: &mut Vec<f32>, picture: &RgbGrid) -> Result<(), WriteError> {
+fn push_planes(out: &mut Vec<f32>, picture: &RgbGrid) -> Result<(), FileError> {
     if picture.size() != [lab::GELSLIM.width, lab::GELSLIM.height] {
-        return Err(WriteError::Incomplete { missing: "GelSlim image of 427 x 320 pixels" });
+        return Err(incomplete("GelSlim image of 427 x 320 pixels"));
     }
     for channel in 0..3 {
         out.extend(picture.as_slice().iter().map(|p| p[channel]));

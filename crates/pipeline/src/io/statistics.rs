@@ -1,14 +1,16 @@
 //! Shift statistics in a file, with where they come from: they serve only the bundle that they are of.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use super::error::FileError;
 use super::{atomic, files};
 use touch2touch_core::postprocess::{RefitShift, ShiftFit, ShiftStats};
 
 const FORMAT: &str = "touch2touch-shift-statistics";
 const VERSION: u32 = 1;
+const MAKE: &str = "make them with `touch2touch stats`";
 
 /// Statistics of a data set's predictions by one bundle and of its measurements.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -57,49 +59,6 @@ pub struct Provenance {
     pub made: String,
 }
 
-/// Why a statistics file cannot be used.
-#[derive(Debug, thiserror::Error)]
-pub enum StatisticsError {
-    /// It cannot be read or written.
-    #[error("{}: {source}", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// It is something else.
-    #[error("{}: not a statistics file: {why}; make one with `touch2touch stats`", path.display())]
-    Parse {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        why: String,
-    },
-    /// The figures of the file cannot be used.
-    #[error("{}: the statistics are not finite, or a deviation is negative; make them again", path.display())]
-    NotUsable {
-        /// The file.
-        path: PathBuf,
-    },
-    /// It is of another bundle.
-    #[error(
-        "the shift statistics are of the bundle \"{of}\" ({}…), but the model is \"{wanted}\" ({}…): statistics of one model say nothing about another; make them for this one with `touch2touch stats`",
-        of_hash.get(..12).unwrap_or(of_hash),
-        wanted_hash.get(..12).unwrap_or(wanted_hash)
-    )]
-    OtherBundle {
-        /// Name of the bundle of the statistics.
-        of: String,
-        /// Hash of that bundle.
-        of_hash: String,
-        /// Name of the bundle in use.
-        wanted: String,
-        /// Hash of that bundle.
-        wanted_hash: String,
-    },
-}
-
 impl ShiftStatistics {
     /// From a pass over a data set; `None` without a pixel on one of the sides.
     pub fn new(provenance: Provenance, fit: &ShiftFit) -> Option<Self> {
@@ -119,10 +78,12 @@ impl ShiftStatistics {
     /// Reads a file.
     ///
     /// # Errors
-    /// See [`StatisticsError`].
-    pub fn read(path: &Path) -> Result<Self, StatisticsError> {
-        let io = |source| StatisticsError::Io { path: path.to_owned(), source };
-        let parse = |why: String| StatisticsError::Parse { path: path.to_owned(), why };
+    /// See [`FileError`].
+    pub fn read(path: &Path) -> Result<Self, FileError> {
+        let io = |err| FileError::io(path, "cannot read the statistics", err);
+        let parse = |why: String| {
+            FileError::new(path, format!("not a statistics file: {why}; make one with `touch2touch stats`"), MAKE)
+        };
         let found: Self = serde_json::from_slice(&files::read(path, files::SMALL).map_err(io)?)
             .map_err(|err| parse(err.to_string()))?;
         if found.format != FORMAT || found.version != VERSION {
@@ -134,7 +95,11 @@ impl ShiftStatistics {
         let ShiftStats { pred_mean, pred_std, gt_mean, gt_std } = found.stats;
         let finite = [pred_mean, pred_std, gt_mean, gt_std].iter().all(|v| v.is_finite());
         if !finite || pred_std < 0.0 || gt_std < 0.0 {
-            return Err(StatisticsError::NotUsable { path: path.to_owned() });
+            return Err(FileError::new(
+                path,
+                "the statistics are not finite, or a deviation is negative; make them again",
+                MAKE,
+            ));
         }
         Ok(found)
     }
@@ -143,24 +108,24 @@ impl ShiftStatistics {
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn write(&self, path: &Path) -> Result<(), StatisticsError> {
-        let io = |source| StatisticsError::Io { path: path.to_owned(), source };
-        let text = serde_json::to_vec_pretty(self).map_err(|err| io(err.into()))?;
-        atomic::write_bytes(path, &text).map_err(io)
+    pub fn write(&self, path: &Path) -> Result<(), FileError> {
+        atomic::write_json(path, "cannot write the statistics", self)
     }
 
     /// The shift they stand for, for the bundle that they are of.
     ///
     /// # Errors
-    /// [`StatisticsError::OtherBundle`], naming both.
-    pub fn shift_for(&self, name: &str, hash: &str) -> Result<RefitShift, StatisticsError> {
+    /// [`FileError`] of another bundle, naming both.
+    pub fn shift_for(&self, name: &str, hash: &str) -> Result<RefitShift, FileError> {
         if self.provenance.bundle_hash != hash {
-            return Err(StatisticsError::OtherBundle {
-                of: self.provenance.bundle.clone(),
-                of_hash: self.provenance.bundle_hash.clone(),
-                wanted: name.to_owned(),
-                wanted_hash: hash.to_owned(),
-            });
+            let start = |hash: &str| hash.get(..12).unwrap_or(hash).to_owned();
+            let what = format!(
+                "the shift statistics are of the bundle \"{}\" ({}…), but the model is \"{name}\" ({}…): statistics of one model say nothing about another; make them for this one with `touch2touch stats`",
+                self.provenance.bundle,
+                start(&self.provenance.bundle_hash),
+                start(hash)
+            );
+            return Err(FileError::new("", what, MAKE));
         }
         Ok(RefitShift::new(self.stats, hash))
     }

@@ -4,129 +4,15 @@ mod other;
 mod speck;
 
 use std::collections::HashMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use glam::DVec3;
 
+use super::error::FileError;
 use touch2touch_core::mesh::{TriMesh, triangle_area};
 
-/// Why a mesh cannot be read or written.
-#[derive(Debug, thiserror::Error)]
-pub enum MeshError {
-    /// The file cannot be opened, read or written.
-    #[error("cannot access the mesh ({}): {source}", file.display())]
-    Io {
-        /// The file.
-        file: PathBuf,
-        /// The system's reason.
-        source: std::io::Error,
-    },
-    /// Neither a binary nor a text STL.
-    #[error("not an STL mesh: {reason} ({})", file.display())]
-    NotStl {
-        /// The file.
-        file: PathBuf,
-        /// Reason, as the message ends.
-        reason: String,
-    },
-    /// A binary STL with fewer or more bytes than its triangle count needs.
-    #[error("the mesh announces {triangles} triangles ({expected} bytes) but has {found} bytes ({})", file.display())]
-    Truncated {
-        /// The file.
-        file: PathBuf,
-        /// Triangles announced.
-        triangles: u32,
-        /// Bytes needed.
-        expected: u64,
-        /// Bytes there.
-        found: u64,
-    },
-    /// A corner that is NaN or infinite.
-    #[error("triangle {triangle} has a corner that is not a number ({})", file.display())]
-    NotFinite {
-        /// The file.
-        file: PathBuf,
-        /// Position of the triangle in the file.
-        triangle: usize,
-    },
-    /// The model is too large or too small to be a tool in meters.
-    #[error(
-        "the CAD model is {} long, which cannot be meters: scale it by {offered} ({})",
-        number(*size),
-        file.display()
-    )]
-    Unit {
-        /// The file.
-        file: PathBuf,
-        /// Longest side of the bounding box, in the file's unit.
-        size: f64,
-        /// The factor that would bring it to meters.
-        offered: f64,
-    },
-    /// Neither the unit that was named nor any other makes the model as large as a tool.
-    #[error("the CAD model is {} long: that is no tool {unit} ({})", number(*size), file.display())]
-    NotATool {
-        /// The file.
-        file: PathBuf,
-        /// Longest side of the bounding box, in the file's unit.
-        size: f64,
-        /// In which unit, and who said so.
-        unit: String,
-    },
-    /// The file that names the unit of the models does not name one.
-    #[error("{reason} ({})", file.display())]
-    UnitFile {
-        /// The file.
-        file: PathBuf,
-        /// Text that was found, and texts that may stand there.
-        reason: String,
-    },
-    /// No triangle with an area.
-    #[error("the mesh has no triangle with an area ({} degenerate ones) ({})", dropped, file.display())]
-    Empty {
-        /// The file.
-        file: PathBuf,
-        /// Degenerate triangles found.
-        dropped: usize,
-    },
-}
-
-impl MeshError {
-    /// The file it is about.
-    pub fn file(&self) -> &Path {
-        match self {
-            Self::Io { file, .. }
-            | Self::NotStl { file, .. }
-            | Self::Truncated { file, .. }
-            | Self::NotFinite { file, .. }
-            | Self::Unit { file, .. }
-            | Self::NotATool { file, .. }
-            | Self::UnitFile { file, .. }
-            | Self::Empty { file, .. } => file,
-        }
-    }
-
-    /// Advice for the user.
-    pub fn hint(&self) -> &'static str {
-        match self {
-            Self::Io { .. } => "check that the file exists and may be read",
-            Self::NotStl { .. } => "export the part as STL from the CAD program",
-            Self::Truncated { .. } => "copy or export the file again",
-            Self::Unit { .. } => {
-                "accept the scale with `touch2touch doctor --set` or the button at the 3D view: a file unit.txt beside the model \
-                 says auto, m, cm, mm, um, in or a factor"
-            }
-            Self::NotATool { .. } => {
-                "tools are 4 mm to 0.4 m long: name the right unit in unit.txt beside the model, or export the model again"
-            }
-            Self::UnitFile { .. } => "write m, cm, mm, um, in, auto or a factor to meters into the file",
-            Self::NotFinite { .. } | Self::Empty { .. } => "repair the mesh in the CAD program and export it again",
-        }
-    }
-}
-
 /// A length of unknown unit for a message, however large.
-fn number(size: f64) -> String {
+pub(super) fn number(size: f64) -> String {
     let size = touch2touch_core::units::significant(size);
     if (1e-4..1e6).contains(&size) { size.to_string() } else { format!("{size:e}") }
 }
@@ -138,14 +24,13 @@ pub struct StlFile {
     pub mesh: TriMesh,
     /// Triangles left out because they have no area.
     pub degenerate: usize,
-    /// The factor that would bring the mesh to meters, where its size says that it is in another unit.
-    pub suggested_scale: Option<f64>,
     /// Faults of the file that it was read in spite of.
     pub mended: Vec<String>,
 }
 
 /// Most bytes of a model: five million triangles. Welding takes about five times as much memory.
 const MAX_BYTES: u64 = 256 << 20;
+const REPAIR: &str = "repair the mesh in the CAD program and export it again";
 const HEADER: usize = 84;
 const RECORD: usize = 50;
 
@@ -155,22 +40,26 @@ const RECORD: usize = 50;
 /// rest is left out and named.
 ///
 /// # Errors
-/// [`MeshError`].
-pub fn read(path: &Path) -> Result<StlFile, MeshError> {
-    let bytes =
-        super::files::read(path, MAX_BYTES).map_err(|source| MeshError::Io { file: path.to_owned(), source })?;
+/// [`FileError`].
+pub fn read(path: &Path) -> Result<StlFile, FileError> {
+    let bytes = super::files::read(path, MAX_BYTES).map_err(|err| cannot_access(path, err))?;
     let mut mended = Vec::new();
     let corners = corners(path, &bytes, &mut mended)?;
     let mut file = weld(path, corners)?;
     mended.extend(speck::leave_out(&mut file.mesh));
-    file.suggested_scale = suggested_scale(&file.mesh);
     Ok(StlFile { mended, ..file })
+}
+
+fn cannot_access(path: &Path, err: std::io::Error) -> FileError {
+    FileError::io(path, "cannot access the mesh", err)
 }
 
 type Corners = Vec<[[f32; 3]; 3]>;
 
-fn corners(path: &Path, bytes: &[u8], mended: &mut Vec<String>) -> Result<Corners, MeshError> {
-    let not_stl = |reason: String| MeshError::NotStl { file: path.to_owned(), reason };
+fn corners(path: &Path, bytes: &[u8], mended: &mut Vec<String>) -> Result<Corners, FileError> {
+    let not_stl = |reason: String| {
+        FileError::new(path, format!("not an STL mesh: {reason}"), "export the part as STL from the CAD program")
+    };
     let count = bytes.get(80..HEADER).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
     let expected = |n: u32| HEADER as u64 + RECORD as u64 * u64::from(n);
     // Some binary files also start with "solid": the length decides.
@@ -201,7 +90,8 @@ fn corners(path: &Path, bytes: &[u8], mended: &mut Vec<String>) -> Result<Corner
         mended.push(format!("{left} byte{s} behind the last triangle left out"));
         return Ok(records(bytes, said));
     }
-    Err(MeshError::Truncated { file: path.to_owned(), triangles: n, expected: expected(n), found: bytes.len() as u64 })
+    let what = format!("the mesh announces {n} triangles ({} bytes) but has {} bytes", expected(n), bytes.len());
+    Err(FileError::new(path, what, "copy or export the file again"))
 }
 
 /// The triangles of a binary file that has so many.
@@ -262,13 +152,13 @@ fn text_corners(text: &str, mended: &mut Vec<String>) -> Result<Corners, String>
     Ok(out)
 }
 
-fn weld(path: &Path, corners: Vec<[[f32; 3]; 3]>) -> Result<StlFile, MeshError> {
+fn weld(path: &Path, corners: Vec<[[f32; 3]; 3]>) -> Result<StlFile, FileError> {
     let mut known: HashMap<[u32; 3], u32> = HashMap::with_capacity(corners.len());
     let mut mesh = TriMesh::default();
     let mut degenerate = 0;
     for (number, triangle) in corners.iter().enumerate() {
         if triangle.iter().flatten().any(|v| !v.is_finite()) {
-            return Err(MeshError::NotFinite { file: path.to_owned(), triangle: number });
+            return Err(FileError::new(path, format!("triangle {number} has a corner that is not a number"), REPAIR));
         }
         let points = triangle.map(|c| DVec3::new(f64::from(c[0]), f64::from(c[1]), f64::from(c[2])));
         if triangle_area(points) <= 0.0 {
@@ -287,22 +177,17 @@ fn weld(path: &Path, corners: Vec<[[f32; 3]; 3]>) -> Result<StlFile, MeshError> 
         mesh.triangles.push(indices);
     }
     if mesh.triangles.is_empty() {
-        return Err(MeshError::Empty { file: path.to_owned(), dropped: degenerate });
+        let what = format!("the mesh has no triangle with an area ({degenerate} degenerate ones)");
+        return Err(FileError::new(path, what, REPAIR));
     }
-    Ok(StlFile { mesh, degenerate, suggested_scale: None, mended: Vec::new() })
-}
-
-/// The factor that brings a model to meters whose size says that it is in another unit.
-fn suggested_scale(mesh: &TriMesh) -> Option<f64> {
-    let [lo, hi] = mesh.bounds()?;
-    touch2touch_core::units::scale_to_meters((hi - lo).max_element()).filter(|&scale| scale != 1.0)
+    Ok(StlFile { mesh, degenerate, mended: Vec::new() })
 }
 
 /// Writes a binary STL; coordinates are rounded to 32 bits.
 ///
 /// # Errors
-/// [`MeshError::Io`] if the disk refuses.
-pub fn write(path: &Path, mesh: &TriMesh) -> Result<(), MeshError> {
+/// [`FileError`] if the disk refuses.
+pub fn write(path: &Path, mesh: &TriMesh) -> Result<(), FileError> {
     let mut out = vec![0u8; 80];
     // Not "solid", which would make some readers take the file for text.
     out[..11].copy_from_slice(b"touch2touch");
@@ -317,7 +202,7 @@ pub fn write(path: &Path, mesh: &TriMesh) -> Result<(), MeshError> {
         }
         out.extend([0, 0]);
     }
-    super::atomic::write_bytes(path, &out).map_err(|source| MeshError::Io { file: path.to_owned(), source })
+    super::atomic::write_bytes(path, &out).map_err(|err| cannot_access(path, err))
 }
 
 #[cfg(test)]
@@ -330,18 +215,14 @@ mod tests {
     }
 
     #[test]
-    fn binary_round_trip_is_watertight_and_knows_its_unit() {
+    fn binary_round_trip_is_watertight() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("t.stl");
         write(&path, &tetrahedron(0.03125)).unwrap();
         let back = read(&path).unwrap();
         assert!(back.mesh.is_watertight());
-        assert_eq!((back.mesh.vertices.len(), back.degenerate, back.suggested_scale), (4, 0, None));
+        assert_eq!((back.mesh.vertices.len(), back.degenerate), (4, 0));
         assert!((back.mesh.area() - tetrahedron(0.03125).area()).abs() < 1e-12);
-        write(&path, &tetrahedron(60.0)).unwrap();
-        assert_eq!(read(&path).unwrap().suggested_scale, Some(1e-3));
-        write(&path, &tetrahedron(60.0e-6)).unwrap();
-        assert_eq!(read(&path).unwrap().suggested_scale, Some(1e3));
     }
 
     #[test]
@@ -429,14 +310,14 @@ mod tests {
             std::fs::write(&path, bytes).unwrap();
             let file = read(&path).unwrap_or_else(|err| panic!("{what}: {err}"));
             assert_eq!((file.mesh.triangles.len(), file.mesh.vertices.len()), (4, 4), "{what}");
-            assert!((file.mesh.area() - sound.area()).abs() < 1e-7 && file.suggested_scale.is_none(), "{what}");
+            assert!((file.mesh.area() - sound.area()).abs() < 1e-7, "{what}");
             assert_eq!(file.mended.len(), usize::from(note.is_some()), "{what}: {:?}", file.mended);
             assert!(file.mended.iter().all(|said| said.contains(note.unwrap())), "{what}: {:?}", file.mended);
         }
         let speck = far(&sound);
         std::fs::write(&path, speck).unwrap();
         let file = read(&path).unwrap();
-        assert_eq!((file.mesh.triangles.len(), file.mesh.vertices.len(), file.suggested_scale), (4, 4, None));
+        assert_eq!((file.mesh.triangles.len(), file.mesh.vertices.len()), (4, 4));
         assert!(file.mended[0].contains("1 triangle") && file.mended[0].contains("left out"), "{:?}", file.mended);
     }
 
@@ -459,10 +340,7 @@ mod tests {
             std::fs::write(&path, &bytes).unwrap();
             let error = read(&path).unwrap_err();
             let said = error.to_string();
-            assert!(
-                matches!(error, MeshError::NotStl { .. }) && said.contains(word) && said.contains("t.stl"),
-                "{said}"
-            );
+            assert!(said.contains("not an STL mesh") && said.contains(word) && said.contains("t.stl"), "{said}");
         }
     }
 }

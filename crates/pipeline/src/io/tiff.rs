@@ -6,8 +6,9 @@ use std::path::Path;
 use tiff::ColorType;
 use tiff::decoder::{Decoder, DecodingResult};
 
+use super::error::FileError;
 use super::files;
-use super::images::{MAX_SIDE, PictureError};
+use super::images::{MAX_SIDE, cannot_access, wrong_kind};
 use touch2touch_core::grid::Grid;
 
 /// Values of a picture.
@@ -29,10 +30,10 @@ const EXPECTED: &str = "a gray TIFF of 16 bits or floats (tifffile.imwrite(name,
 /// Reads a gray TIFF.
 ///
 /// # Errors
-/// [`PictureError::Kind`] for any other kind.
-pub(crate) fn read(file: &Path) -> Result<Gray, PictureError> {
-    let bytes = files::read(file, MAX_BYTES).map_err(|source| PictureError::Io { file: file.to_owned(), source })?;
-    decode(bytes).map_err(|found| PictureError::Kind { file: file.to_owned(), found, expected: EXPECTED })
+/// [`FileError`] for any other kind.
+pub(crate) fn read(file: &Path) -> Result<Gray, FileError> {
+    let bytes = files::read(file, MAX_BYTES).map_err(|err| cannot_access(file, err))?;
+    decode(bytes).map_err(|found| wrong_kind(file, found, EXPECTED))
 }
 
 fn decode(bytes: Vec<u8>) -> Result<Gray, String> {

@@ -10,7 +10,8 @@ use super::stored::{Signed, store_error, stored_review};
 use super::{Change, Labels, Operation, PairLabels, note};
 use crate::error::TaskError;
 use crate::io::dataset::Dataset;
-use crate::io::masks::{MaskStore, StoreError};
+use crate::io::error::FileError;
+use crate::io::masks::MaskStore;
 use crate::io::{atomic, files, names};
 use touch2touch_core::units::counted;
 
@@ -122,7 +123,7 @@ impl Labels {
     /// If they cannot be written there either.
     pub fn keep_in(&self, dataset: &Dataset, unsaved: &[Unsaved], folder: &Path) -> Result<(), TaskError> {
         const WHAT: &str = "Keep the labels elsewhere";
-        let fail = |err: StoreError| store_error(WHAT, &err);
+        let fail = |err: FileError| store_error(WHAT, &err);
         let all = MaskStore::in_folder(folder.to_owned()).of_rig(dataset.rig.clone());
         let _held = all.hold().map_err(fail)?;
         let mut manifest = Manifest::read(folder).unwrap_or_else(|| Manifest::of(dataset));
@@ -140,8 +141,7 @@ impl Labels {
         manifest.pairs.dedup();
         // Last: without it nothing is taken in, and with it all of it is there.
         let file = folder.join(MANIFEST);
-        let io = |err: std::io::Error| TaskError::new(WHAT, format!("{err} ({})", file.display()));
-        atomic::write_bytes(&file, &serde_json::to_vec_pretty(&manifest).map_err(|err| io(err.into()))?).map_err(io)
+        atomic::write_json(&file, "cannot write the list of them", &manifest).map_err(fail)
     }
 }
 

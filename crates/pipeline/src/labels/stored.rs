@@ -11,15 +11,15 @@ use super::{
 };
 use crate::error::{TaskError, TaskErrorKind};
 use crate::io::dataset::Dataset;
-use crate::io::masks::{self, MaskStore, StoreError, StoredMask, StoredReview};
-use touch2touch_core::dataset::Problem;
+use crate::io::error::{FileError, FileErrorKind};
+use crate::io::masks::{self, MaskStore, StoredMask, StoredReview};
 use touch2touch_core::rig::PadId;
 use touch2touch_core::units::counted;
 
 /// The labels of an open data set. Clones share what they know.
 #[derive(Clone, Debug)]
 pub struct Labels {
-    store: Arc<Result<MaskStore, StoreError>>,
+    store: Arc<Result<MaskStore, FileError>>,
     /// Labels that whoever saves here holds, as far as they were read or given here: only differences are written, over
     /// what somebody else may have written meanwhile.
     saved: Arc<Mutex<BTreeMap<String, PairLabels>>>,
@@ -33,10 +33,9 @@ fn hand_of(stored: StoredMask) -> DrawnMask {
     DrawnMask { mask: Arc::new(stored.mask), marks: Arc::new(stored.marks), revision: Revision::default() }
 }
 
-pub(super) fn store_error(what: &str, err: &StoreError) -> TaskError {
-    let lost = matches!(err, StoreError::Lost(_));
-    let kind = if lost { TaskErrorKind::Lost } else { TaskErrorKind::Failed };
-    TaskError { kind, ..TaskError::from_error(what, err).with_hint(err.hint()) }
+pub(super) fn store_error(what: &str, err: &FileError) -> TaskError {
+    let kind = if err.kind == FileErrorKind::Lost { TaskErrorKind::Lost } else { TaskErrorKind::Failed };
+    TaskError { kind, ..TaskError::from_error(what, err).with_hint(err.hint) }
 }
 
 impl Labels {
@@ -68,15 +67,13 @@ impl Labels {
         let store = match &*self.store {
             Ok(store) => store,
             Err(err) => {
-                let problem =
-                    Problem { file: std::path::PathBuf::new(), what: err.to_string(), hint: err.hint().into() };
-                return Reviews { problems: vec![problem], ..Reviews::default() };
+                return Reviews { problems: vec![err.to_problem()], ..Reviews::default() };
             }
         };
         let (stored, problems) = store.reviews();
         let mut reviews = Reviews { problems, ..Reviews::default() };
         for (pair, stored) in stored {
-            if let Some(state) = Review::from_stored(&stored.review).filter(|state| *state != Review::Todo) {
+            if let Some(state) = stored.review.parse::<Review>().ok().filter(|state| *state != Review::Todo) {
                 reviews.states.insert(pair.clone(), state);
             }
             let text = note(&stored.note);
@@ -99,7 +96,7 @@ impl Labels {
     pub fn persons(&self, name: &str) -> Result<BTreeSet<String>, TaskError> {
         let what = format!("Labels of {name}");
         let store = self.store(&what)?;
-        let fail = |err: StoreError| store_error(&what, &err);
+        let fail = |err: FileError| store_error(&what, &err);
         let mut persons = BTreeSet::new();
         for pad in store.rig().pads() {
             persons.extend(store.load(name, pad).map_err(fail)?.map(|stored| stored.person));
@@ -116,7 +113,7 @@ impl Labels {
         let what = format!("Labels of {name}");
         // Without a place for labels there are none; saving says why.
         let Ok(store) = &*self.store else { return Ok(PairLabels::default()) };
-        let fail = |err: StoreError| store_error(&what, &err);
+        let fail = |err: FileError| store_error(&what, &err);
         let mut labels = PairLabels::default();
         for pad in store.rig().pads() {
             if let Some(stored) = store.load(name, pad).map_err(fail)? {
@@ -127,7 +124,7 @@ impl Labels {
             }
         }
         if let Some(stored) = store.load_review(name).map_err(fail)? {
-            labels.review = Review::from_stored(&stored.review).ok_or_else(|| {
+            labels.review = stored.review.parse::<Review>().map_err(|_| {
                 TaskError::new(&what, format!("the review state \"{}\" is not known", stored.review))
                     .with_hint("It may come from a newer version of this program.")
             })?;
@@ -139,7 +136,7 @@ impl Labels {
     }
 
     /// The mask that lies on the disk in a place now.
-    fn there(&self, store: &MaskStore, name: &str, place: &MaskPlace) -> Result<Option<DrawnMask>, StoreError> {
+    fn there(&self, store: &MaskStore, name: &str, place: &MaskPlace) -> Result<Option<DrawnMask>, FileError> {
         let stored = match &place.of {
             ImprintOf::Measured => store.load(name, place.pad)?,
             ImprintOf::Predicted(of) => {
@@ -185,7 +182,7 @@ impl Labels {
     pub fn save(&self, name: &str, labels: &PairLabels, deed: &Operation) -> Result<Option<PairLabels>, TaskError> {
         let what = format!("Save the labels of {name}");
         let store = self.store(&what)?;
-        let fail = |err: StoreError| store_error(&what, &err);
+        let fail = |err: FileError| store_error(&what, &err);
         let before = self.known(name);
         let mut change = Change::between(&before, labels);
         let by = Signed::now(deed);
@@ -245,7 +242,7 @@ impl Signed {
         name: &str,
         place: &MaskPlace,
         mask: Option<&DrawnMask>,
-    ) -> Result<(), StoreError> {
+    ) -> Result<(), FileError> {
         let stored = mask.map(|hand| StoredMask {
             mask: (*hand.mask).clone(),
             marks: (*hand.marks).clone(),

@@ -77,82 +77,73 @@ pub struct Edited {
     pub change: Change,
 }
 
-impl LabelEdit<'_> {
-    /// Name and numbers of it.
-    fn deed(&self) -> Operation {
-        let with = |name: &'static str, how: serde_json::Result<serde_json::Value>| Operation {
-            how: how.ok(),
-            ..Operation::named(name)
-        };
-        match self {
-            Self::Draw { drawing, .. } => {
-                let name = if drawing.sight.is_some() {
-                    format!("{} in 3D", drawing.name()).into()
-                } else {
-                    drawing.name().into()
-                };
-                Operation { name, ..with("", serde_json::to_value(drawing)) }
-            }
-            Self::CleanUp { clean_up, .. } => with(clean_up.kind.name(), serde_json::to_value(clean_up)),
-            Self::Adopt(_) => Operation::named("automatic mask taken over"),
-            Self::AcceptProposal { proposal, .. } => {
-                with("proposal accepted", serde_json::to_value(&proposal.provenance))
-            }
-            Self::Remove(_) => Operation::named("correction removed"),
-            Self::Review(_) => Operation::named("review state"),
-            Self::Done { automatic, .. } if automatic.is_empty() => Operation::named("review state"),
-            Self::Done { .. } => Operation::named("done, automatic masks accepted"),
-            Self::Note(_) => Operation::named("note"),
-            Self::AcceptPose(_, AcceptedPose { by_hand: true, .. }) => Operation::named("pose set by hand"),
-            Self::AcceptPose(..) => Operation::named("pose accepted"),
-            Self::WithdrawPose(_) => Operation::named("pose withdrawn"),
-        }
-    }
-}
-
 /// Does something to labels; a pair whose mask changes counts as begun. `None` where nothing changes.
 ///
 /// # Errors
 /// If it cannot be done.
 pub fn edit(labels: &PairLabels, edit: LabelEdit<'_>) -> Result<Option<Edited>, TaskError> {
-    let (deed, mut now) = (edit.deed(), labels.clone());
-    match edit {
-        LabelEdit::Draw { on, mask, .. } => {
+    let named = |name: &'static str| Operation::named(name);
+    let mut now = labels.clone();
+    let deed = match edit {
+        LabelEdit::Draw { on, mask, drawing } => {
             if !mask.is_same(&on.mask) {
                 now.draw(&on.place, Some(mask));
             }
+            let in_3d = if drawing.sight.is_some() { " in 3D" } else { "" };
+            let how = serde_json::to_value(drawing).ok();
+            Operation { how, ..Operation::named(format!("{}{in_3d}", drawing.name())) }
         }
         LabelEdit::CleanUp { mut on, clean_up, rig } => {
             if on.mask.clean(clean_up, rig) {
                 now.draw(&on.place, Some(on.mask));
             }
+            Operation { how: serde_json::to_value(clean_up).ok(), ..named(clean_up.kind.name()) }
         }
-        LabelEdit::Adopt(TakenUp { place, mask }) => now.draw(&place, Some(mask)),
+        LabelEdit::Adopt(TakenUp { place, mask }) => {
+            now.draw(&place, Some(mask));
+            named("automatic mask taken over")
+        }
         LabelEdit::AcceptProposal { place, proposal, over_drawn } => {
             let drawn = now.drawn_of_size(&place, proposal.mask.size());
             let mask = accepted(drawn, proposal, over_drawn);
             if !drawn.is_some_and(|drawn| drawn.is_same(&mask)) {
                 now.draw(&place, Some(mask));
             }
+            Operation { how: serde_json::to_value(&proposal.provenance).ok(), ..named("proposal accepted") }
         }
         LabelEdit::Remove(place) => {
             if now.masks.contains_key(&place) {
                 now.draw(&place, None);
             }
+            named("correction removed")
         }
-        LabelEdit::Review(review) => now.review = review,
+        LabelEdit::Review(review) => {
+            now.review = review;
+            named("review state")
+        }
         LabelEdit::Done { automatic, by } => {
+            let name = if automatic.is_empty() { "review state" } else { "done, automatic masks accepted" };
             for TakenUp { place, mask } in automatic {
                 if !now.masks.contains_key(&place) {
                     now.put(&place, Some(mask.accepted(&by)));
                 }
             }
             now.review = Review::Done;
+            named(name)
         }
-        LabelEdit::Note(text) => now.note = note(text),
-        LabelEdit::AcceptPose(of, pose) => drop(now.accept(&of, Some(pose))),
-        LabelEdit::WithdrawPose(of) => drop(now.accept(&of, None)),
-    }
+        LabelEdit::Note(text) => {
+            now.note = note(text);
+            named("note")
+        }
+        LabelEdit::AcceptPose(of, pose) => {
+            now.accept(&of, Some(pose));
+            named(if pose.by_hand { "pose set by hand" } else { "pose accepted" })
+        }
+        LabelEdit::WithdrawPose(of) => {
+            now.accept(&of, None);
+            named("pose withdrawn")
+        }
+    };
     let change = Change::between(labels, &now);
     Ok((!change.is_empty()).then_some(Edited { deed, change }))
 }

@@ -191,14 +191,6 @@ impl MaskRecipe {
         self.provenance(model, MaskBasis::Source).text()
     }
 
-    /// The least probability of contact, where it is not the mask model's own.
-    pub fn probability(&self) -> Option<f32> {
-        match self {
-            Self::Unet(_, least) => least.map(Bits::get),
-            _ => None,
-        }
-    }
-
     /// The source that it is of.
     pub fn source(&self) -> MaskSource {
         match self {

@@ -18,14 +18,12 @@ use crate::io::catch_panic::catch_panic;
 use crate::job::{JobCx, PreviewPicture};
 use crate::steps::bundles::{BundleInfo, BundleKind, by_id};
 use crate::steps::imprint::in_meters;
-use crate::steps::mask::{self, Contact, MaskChoice, MaskInputs, MaskRecipe, no_mask_model};
 use crate::steps::prediction::{Chains, Prediction};
 use touch2touch_core::contact::ContactMask;
 use touch2touch_core::diffusion::{GenerateConfig, Progress};
 use touch2touch_core::fit::Fitted;
 use touch2touch_core::grid::{DepthMap, Grid, RgbGrid};
 use touch2touch_core::postprocess::{ColorChain, RawPrediction, ShiftMode};
-use touch2touch_core::rig::{PadId, PerPad};
 
 /// Predictions of one touch that are read back; older ones stay on the disk.
 const LISTED: usize = 16;
@@ -386,41 +384,6 @@ impl Models {
             ask(model).map_err(|err| TaskError::from_error(format!("Mask with {}", bundle.name), &err))
         })
     }
-
-    /// The contact mask of one pad's imprint: the one drawn by hand, else as the choice says.
-    ///
-    /// # Errors
-    /// If something the choice needs is not there, or the model cannot be loaded or run.
-    pub fn contact_mask(
-        &self,
-        by: Masking<'_>,
-        imprint: &DepthMap,
-        pad: PadId,
-        inputs: MaskInputs<'_>,
-    ) -> Result<ContactMask, TaskError> {
-        let unet = |imprint: &DepthMap| match by.model {
-            Some(model) => self.mask(model, by.engine, imprint, by.choice.probability),
-            None => Err(no_mask_model()),
-        };
-        mask::contact_mask(&by.recipe()?, imprint, pad, inputs, unet)
-    }
-
-    /// The contact masks of all imprints of a pair, as [`Self::contact_mask`].
-    ///
-    /// # Errors
-    /// As [`Self::contact_mask`].
-    pub fn contact(
-        &self,
-        by: Masking<'_>,
-        imprints: PerPad<DepthMap>,
-        inputs: MaskInputs<'_>,
-    ) -> Result<Contact, TaskError> {
-        let mut masks = PerPad::default();
-        for (pad, imprint) in imprints.entries() {
-            masks[pad] = Some(self.contact_mask(by, imprint, pad, inputs)?);
-        }
-        Ok(Contact { imprints, masks, recipe: by.recipe()?, model: by.model.map(|model| model.name.clone()) })
-    }
 }
 
 fn open_generator(bundle: &BundleInfo, engine: EngineChoice) -> Result<Generator, TaskError> {
@@ -431,27 +394,6 @@ fn open_generator(bundle: &BundleInfo, engine: EngineChoice) -> Result<Generator
 fn open_mask_model(bundle: &BundleInfo, engine: EngineChoice) -> Result<MaskModel, TaskError> {
     let what = format!("Mask with {}", bundle.name);
     MaskModel::open(&bundle.open(&what)?, engine).map_err(|err| TaskError::from_error(&what, &err))
-}
-
-/// Choice, model and engine of contact masks.
-#[derive(Clone, Copy, Debug)]
-pub struct Masking<'a> {
-    /// Of what.
-    pub choice: MaskChoice,
-    /// The mask model, where there is one.
-    pub model: Option<&'a BundleInfo>,
-    /// The engine that runs it.
-    pub engine: EngineChoice,
-}
-
-impl Masking<'_> {
-    /// The recipe behind the choice.
-    ///
-    /// # Errors
-    /// If it takes a model and there is none.
-    pub fn recipe(&self) -> Result<MaskRecipe, TaskError> {
-        self.choice.recipe(self.model.map(|model| &model.id)).ok_or_else(no_mask_model)
-    }
 }
 
 /// The images of some items, each once (both fingers of a grasp have their own, many seeds share one), and which is

@@ -25,9 +25,6 @@ pub struct Generating<'a> {
     pub config: &'a GenerateConfig,
 }
 
-/// A pad's picture that the generator starts from, with the place of its pair.
-type Picture<'a> = (usize, PadId, Cow<'a, RgbGrid>);
-
 /// The predictions of a pair's pads, or why a pad has none.
 pub type Predicted = PerPad<Result<Prediction, TaskError>>;
 
@@ -79,24 +76,12 @@ impl Generating<'_> {
     /// # Errors
     /// As [`Models::predict`].
     pub fn of(self, models: &Models, pictures: &[Cow<'_, RgbGrid>], cx: &JobCx) -> Result<Vec<Prediction>, TaskError> {
-        let wanted = |difference| GenerateInput { difference, seed: self.config.seed, size: [0, 0] };
-        let wanted: Vec<_> = pictures.iter().map(|picture| wanted(&**picture)).collect();
+        let wanted: Vec<_> = pictures.iter().map(|picture| self.starting_from(picture)).collect();
         models.predict(self.bundle, self.engine, self.config, &wanted, cx)
     }
 
-    fn pictures<'s>(self, samples: &[&'s Sample]) -> Result<Vec<Picture<'s>>, TaskError> {
-        let mut found = Vec::new();
-        for (at, sample) in samples.iter().enumerate() {
-            let input = self.input(&sample.rig)?;
-            found.extend(sample.pads.entries().filter_map(|(pad, touch)| Some((at, pad, touch.picture(input)?))));
-        }
-        Ok(found)
-    }
-
-    fn wanted<'p>(self, pictures: &'p [Picture<'_>]) -> Vec<GenerateInput<'p>> {
-        let wanted =
-            |(.., difference): &'p Picture<'_>| GenerateInput { difference, seed: self.config.seed, size: [0, 0] };
-        pictures.iter().map(wanted).collect()
+    fn starting_from(self, difference: &RgbGrid) -> GenerateInput<'_> {
+        GenerateInput { difference, seed: self.config.seed, size: [0, 0] }
     }
 
     /// The predictions of a pair's pads. Pads without a picture to start from have none.
@@ -126,7 +111,7 @@ impl Generating<'_> {
         }
         let wanted: Vec<GenerateInput<'_>> = pictures
             .iter()
-            .map(|(_, difference, size)| GenerateInput { difference, seed: self.config.seed, size: *size })
+            .map(|(_, picture, size)| GenerateInput { size: *size, ..self.starting_from(picture) })
             .collect();
         let made = models.predict(self.bundle, self.engine, self.config, &wanted, cx)?;
         let mut out = PerPad::default();
@@ -142,8 +127,12 @@ impl Generating<'_> {
     /// # Errors
     /// As [`Self::input`].
     pub fn pairs(self, models: &Models, samples: &[&Sample], cx: &JobCx) -> Result<Option<Vec<Predicted>>, TaskError> {
-        let pictures = self.pictures(samples)?;
-        let wanted = self.wanted(&pictures);
+        let mut pictures: Vec<(usize, PadId, Cow<'_, RgbGrid>)> = Vec::new();
+        for (at, sample) in samples.iter().enumerate() {
+            let input = self.input(&sample.rig)?;
+            pictures.extend(sample.pads.entries().filter_map(|(pad, touch)| Some((at, pad, touch.picture(input)?))));
+        }
+        let wanted: Vec<_> = pictures.iter().map(|(.., picture)| self.starting_from(picture)).collect();
         let Some(made) = models.predict_each(self.bundle, self.engine, self.config, &wanted, cx) else {
             return Ok(None);
         };

@@ -26,7 +26,8 @@ pub use choices::{GeneratorChoice, ShiftChoice};
 pub use words::{Words, meters, millimeters, quoted};
 
 /// The steps from a touch to a pose, in order; the result of each is made from the one before.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, strum::EnumIter)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, strum::EnumIter, strum::IntoStaticStr)]
+#[strum(serialize_all = "snake_case")]
 pub enum Stage {
     /// Prediction of the generator.
     Prediction,
@@ -193,7 +194,8 @@ impl Recipe {
     pub fn until(&self, stage: Stage) -> Self {
         let predicted = self.imprint == ImprintSource::Predicted;
         let masked = stage >= Stage::Mask;
-        let unet = masked && self.takes_mask_model() && self.mask_model.is_some();
+        let takes_model = matches!(self.mask.source, MaskSource::Auto | MaskSource::Unet);
+        let unet = masked && takes_model && self.mask_model.is_some();
         let from = Self::unnamed();
         Self {
             imprint: self.imprint,
@@ -205,11 +207,6 @@ impl Recipe {
             registration: if stage >= Stage::Pose { self.registration } else { from.registration },
             engine: if predicted || unet { self.engine } else { from.engine },
         }
-    }
-
-    /// True where the mask model is run.
-    fn takes_mask_model(&self) -> bool {
-        matches!(self.mask.source, MaskSource::Auto | MaskSource::Unet)
     }
 }
 

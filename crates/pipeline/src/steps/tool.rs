@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use crate::error::{TaskError, UnitOffer, says};
 use crate::io::dataset::{Dataset, ToolFile, ToolUnit, UNIT_FILE, said_beside, tool_size, write_beside};
-use crate::io::stl::MeshError;
+use crate::io::error::{FileError, FileErrorKind};
 use touch2touch_core::dataset::Problem;
 use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::pose::ToolModel;
@@ -32,13 +32,8 @@ pub fn tool_file(dataset: &Dataset, name: &str) -> Result<ToolFile, TaskError> {
         Ok(None) => Err(TaskError::new(what, format!("there is no {name}.stl, so its grasps have no pose"))
             .with_hint("Put it into tools_stls, in meters and the object frame.")),
         Err(err) => {
-            let units = match err {
-                MeshError::Unit { .. } | MeshError::NotATool { .. } | MeshError::UnitFile { .. } => {
-                    offer(dataset, name)
-                }
-                _ => None,
-            };
-            Err(TaskError { units, ..TaskError::new(what, says(&err)).with_hint(err.hint()) })
+            let units = if err.kind == FileErrorKind::Unit { offer(dataset, name) } else { None };
+            Err(TaskError { units, ..TaskError::new(what, says(&err)).with_hint(err.hint) })
         }
     }
 }
@@ -55,7 +50,7 @@ fn offer(dataset: &Dataset, tool: &str) -> Option<Arc<UnitOffer>> {
 /// If there is no such file, or it cannot be read.
 pub fn units_of(dataset: &Dataset, tool: &str) -> Result<UnitOffer, TaskError> {
     let what = || format!("CAD model of {tool}");
-    let fail = |err: MeshError| TaskError::new(what(), says(&err)).with_hint(err.hint());
+    let fail = |err: FileError| TaskError::new(what(), says(&err)).with_hint(err.hint);
     let Some(file) = dataset.tool_mesh_file(tool) else {
         return Err(TaskError::new(what(), "there is no file of it in this data set"));
     };
@@ -192,13 +187,13 @@ impl<'a> Tools<'a> {
         self.known(name)
     }
 
-    /// Oddities of the files that were read.
-    pub(crate) fn into_notes(self) -> Vec<Problem> {
-        self.notes
-    }
-
     /// The model of a tool that was asked for before.
     pub fn known(&self, name: &str) -> Option<&ToolModel> {
         self.models.get(name)?.as_ref()
+    }
+
+    /// Oddities of the files that were read.
+    pub(crate) fn into_notes(self) -> Vec<Problem> {
+        self.notes
     }
 }

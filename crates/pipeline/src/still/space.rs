@@ -10,15 +10,15 @@ use crate::compare::deviation::{Deviation, deviation};
 use crate::error::TaskError;
 use crate::io::dataset::Dataset;
 use crate::job::JobCx;
-use crate::labels::{ImprintSource, PairLabels};
+use crate::labels::ImprintSource;
 use crate::steps::estimate::{Touch, estimate};
 use crate::steps::models::Models;
 use crate::steps::pose::PoseResult;
 use crate::steps::prediction::predicted_by;
 use crate::steps::recipe::{Recipe, Stage};
 use crate::steps::tool::load_tool;
+use crate::still::StillSetup;
 use touch2touch_core::cloud::membrane;
-use touch2touch_core::dataset::PairId;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::Grid;
 use touch2touch_core::mesh::TriMesh;
@@ -58,6 +58,11 @@ impl SpacePane {
             Self::Predicted => &[ImprintSource::Predicted],
             Self::Both => &[ImprintSource::Measured, ImprintSource::Predicted],
         }
+    }
+
+    /// The one of them that asks for a generator, if there is one.
+    pub fn farthest(self) -> ImprintSource {
+        if self == Self::Measured { ImprintSource::Measured } else { ImprintSource::Predicted }
     }
 }
 
@@ -147,42 +152,27 @@ pub struct InSpace {
     pub note: String,
 }
 
-/// A pair of a data set, with what its results depend on.
-#[derive(Clone, Copy)]
-pub struct SpaceInput<'a> {
-    /// The data set.
-    pub dataset: &'a Dataset,
-    /// The pair.
-    pub pair: PairId,
-    /// Recipe of its results; its imprint is that of the side.
-    pub recipe: &'a Recipe,
-    /// Labels that people gave the pair.
-    pub labels: &'a PairLabels,
-    /// The models.
-    pub models: &'a Models,
-}
-
 /// Makes membranes, contact points and poses of a pair, and where they are shown the distances between them.
 ///
 /// # Errors
 /// If prediction, imprint or mask cannot be made. Without a tool or a pose it is shown without.
 pub fn in_space(
-    input: SpaceInput<'_>,
+    dataset: &Dataset,
+    setup: &StillSetup,
     sample: &Sample,
-    sides: &[ImprintSource],
-    distances: bool,
+    models: &Models,
     cx: &JobCx,
 ) -> Result<InSpace, TaskError> {
     const WHAT: &str = "3D picture";
-    let SpaceInput { dataset, pair, recipe, labels, models } = input;
-    let name = dataset.index.get(pair).and_then(|entry| entry.tool.as_deref());
+    let StillSetup { pair, pane, recipe, labels, distance_m, .. } = setup;
+    let name = dataset.index.get(*pair).and_then(|entry| entry.tool.as_deref());
     let tool = match name {
         Some(name) => load_tool(dataset, name).map(|loaded| loaded.model),
         None => Err(TaskError::new(WHAT, "no tool is named")),
     };
-    let touch = Touch { dataset, pair, sample, tool: tool.as_ref(), labels };
+    let touch = Touch { dataset, pair: *pair, sample, tool: tool.as_ref(), labels };
     let (mut made, mut notes) = (Vec::new(), Vec::new());
-    for &source in sides {
+    for &source in pane.sides() {
         let recipe = Recipe { imprint: source, ..recipe.clone() };
         let estimate = estimate(touch, &recipe, Stage::Pose, models, cx)?;
         let clouds = estimate.contact().clouds(sample)?;
@@ -195,7 +185,7 @@ pub fn in_space(
             membranes[pad] = camera.and_then(|camera| membrane(imprint, camera).ok()).map(Arc::new);
         }
         let pose = estimate.pose().ok().cloned();
-        let apart = pose.as_ref().zip(tool.as_ref().ok()).filter(|_| distances);
+        let apart = pose.as_ref().zip(tool.as_ref().ok()).filter(|_| distance_m.is_some());
         let deviation = apart.map(|(pose, tool)| deviation(&clouds, tool, pose.grasp_from_object));
         notes.push(side_note(&recipe, pose.as_ref()));
         let contact = clouds.fingers.as_ref().map(|cloud| cloud.map(contact));

@@ -7,7 +7,8 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::FileEntry;
-use crate::io::npz::{self, NpzError};
+use crate::io::error::FileError;
+use crate::io::npz;
 use crate::io::pt::Tensor;
 use touch2touch_core::fit::sound::absurd;
 use touch2touch_core::fit::{FitSource, Fitted, PadFit};
@@ -32,7 +33,7 @@ pub struct FitSpec {
 ///
 /// # Errors
 /// If the file cannot be written.
-pub fn write(path: &Path, pads: &[String], fitted: &Fitted) -> Result<(), NpzError> {
+pub fn write(path: &Path, pads: &[String], fitted: &Fitted) -> Result<(), FileError> {
     let mut arrays: Vec<(String, Tensor)> = Vec::new();
     let mut shared = None;
     for (pad, fit) in fitted.pads.entries() {

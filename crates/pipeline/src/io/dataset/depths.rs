@@ -21,15 +21,16 @@ use glam::{DAffine3, DMat3, DVec3};
 use super::cad::{CAD_FOLDER, cad_files};
 use super::lab::NO_TOUCH;
 use super::rig_json::{RIG_JSON, rig_of};
-use super::{InvalidPixels, LoadError, Loaded, OpenError, Scan, Source, SourceKind};
-use super::{most_invalid, plausible, problem, same_name};
+use super::{Files, InvalidPixels, Loaded, Scan, Source, SourceKind};
+use super::{colors, error, most_invalid, plausible, problem, same_name};
 use crate::io::catch_panic::catch_panic;
+use crate::io::error::FileError;
 use crate::io::files;
 use crate::io::names::is_output;
-use crate::io::pt::{PtDict, PtError, read_dict};
-use touch2touch_core::dataset::{PairEntry, PairId, Problem, Split};
+use crate::io::pt::{PtDict, read_dict, too_large};
+use touch2touch_core::dataset::{PairEntry, Problem, Split};
 use touch2touch_core::frames::PlanarPose;
-use touch2touch_core::grid::{DepthMap, Grid, RgbGrid};
+use touch2touch_core::grid::{DepthMap, Grid};
 use touch2touch_core::rig::{PadId, Rig, lab};
 use touch2touch_core::sample::{ColorTouch, DepthCamera, DepthTouch, PadTouch, Sample};
 use touch2touch_core::sensor::Intrinsics;
@@ -74,15 +75,11 @@ const LEAST_MM: f32 = -0.02;
 /// Distance of the assumed camera from the gel, meters: so far that its rays are parallel to 0.01 mm, as the depths are.
 const CAMERA_M: f64 = 2.0;
 
-/// The touches of a folder's files, in the order of the index.
+/// A touch: a row of a file's tensors.
 #[derive(Clone, Debug)]
-pub(super) struct Depths {
-    files: Vec<File>,
-    /// File and row of each pair.
-    pub(super) pairs: Vec<(u32, u32)>,
-    pub(super) folders: Vec<PathBuf>,
-    pub(super) meshes: BTreeMap<String, PathBuf>,
-    rig: Arc<Rig>,
+pub(super) struct Row {
+    file: Arc<File>,
+    at: usize,
 }
 
 #[derive(Clone, Debug)]
@@ -96,8 +93,8 @@ struct File {
 /// Looks for such files in `folder`, or in the folders of the published data set in it; `None` if there are none.
 ///
 /// # Errors
-/// [`OpenError::Rig`] if a `rig.json` is there and does not declare a GelSlim with its depth.
-pub(super) fn scan(folder: &Path) -> Result<Option<Scan>, OpenError> {
+/// [`FileError`] if a `rig.json` is there and does not declare a GelSlim with its depth.
+pub(super) fn scan(folder: &Path) -> Result<Option<Scan>, FileError> {
     let mut found = Found::default();
     found.look(folder);
     if found.files.is_empty() && found.problems.is_empty() {
@@ -115,7 +112,7 @@ pub(super) fn scan(folder: &Path) -> Result<Option<Scan>, OpenError> {
 }
 
 /// The rig that a [`RIG_JSON`] declares, such as one of another scale, or the lab's.
-fn rig(root: &Path) -> Result<Arc<Rig>, OpenError> {
+fn rig(root: &Path) -> Result<Arc<Rig>, FileError> {
     let declared = rig_of(root)?;
     if *declared == *Rig::lab() {
         return Ok(Arc::new(lab::depth_rig()));
@@ -130,14 +127,14 @@ fn rig(root: &Path) -> Result<Arc<Rig>, OpenError> {
          {HEIGHT} pixels each, on two pads",
         lab::GELSLIM_DEPTH.key
     );
-    Err(OpenError::Rig { path: root.join(RIG_JSON), why })
+    Err(error::bad_rig(&root.join(RIG_JSON), why))
 }
 
 #[derive(Default)]
 struct Found {
     files: Vec<File>,
     folders: Vec<PathBuf>,
-    pairs: Vec<(PairEntry, (u32, u32))>,
+    pairs: Vec<(PairEntry, (usize, usize))>,
     problems: Vec<Problem>,
 }
 
@@ -159,8 +156,8 @@ impl Found {
         }
         self.folders.push(folder.to_owned());
         for path in paths {
-            let read = catch_panic(|| Ok(touches(&read_dict(&path)?)?));
-            let failed = |message| Err(LoadError::Bug { files: vec![path.clone()], message });
+            let read = catch_panic(|| touches(&read_dict(&path)?));
+            let failed = |message: String| Err(error::bug(std::slice::from_ref(&path), &message));
             match read.unwrap_or_else(failed) {
                 Ok(touches) => self.add(path, touches),
                 Err(err) => self.problems.push(err.to_problem()),
@@ -176,10 +173,10 @@ impl Found {
         }
         let part = PARTS.iter().find_map(|(end, split)| Some((stem.strip_suffix(end)?, *split)));
         let (tool, split) = part.unwrap_or((&stem, Split::None));
-        let at = self.files.len() as u32;
+        let at = self.files.len();
         self.pairs.extend((0..touches).map(|row| {
             let name = format!("{stem}/data_{row}");
-            (PairEntry { name, tool: Some(tool.to_owned()), split, number: row as u64 }, (at, row as u32))
+            (PairEntry { name, tool: Some(tool.to_owned()), split, number: row as u64 }, (at, row))
         }));
         self.files.push(File { path, touches, width_mm: None });
     }
@@ -195,21 +192,17 @@ impl Found {
             .filter_map(|(tool, width)| Some((tool.trim(), width.trim().parse().ok()?)))
             .collect();
         for (entry, (file, _)) in pairs.iter().zip(&rows) {
-            self.files[*file as usize].width_mm = entry.tool.as_deref().and_then(|tool| widths.get(tool).copied());
+            self.files[*file].width_mm = entry.tool.as_deref().and_then(|tool| widths.get(tool).copied());
         }
         let places = [root.join(CAD_FOLDER), root.join(MESHES)].into_iter();
         let above = root.parent().into_iter().flat_map(|above| [above.join(CAD_FOLDER), above.join(MESHES)]);
         let tools = pairs.iter().filter_map(|pair| pair.tool.as_deref());
         let meshes = cad_files(root, places.chain(above).collect(), tools, |_| false, &mut self.problems);
-        let source = Depths { files: self.files, pairs: rows, folders: self.folders, meshes, rig: rig.clone() };
-        Scan {
-            root: root.to_owned(),
-            pairs,
-            problems: self.problems,
-            source: Source::Depths(source),
-            kind: SourceKind::Lab,
-            rig,
-        }
+        let shared: Vec<Arc<File>> = self.files.into_iter().map(Arc::new).collect();
+        let files = rows.into_iter().map(|(file, at)| Files::Row(Row { file: shared[file].clone(), at })).collect();
+        let (root, kind) = (root.to_owned(), SourceKind::Lab);
+        let (problems, folders, source) = (self.problems, self.folders, Source::Depths);
+        Scan { root, pairs, problems, files, folders, meshes, source, kind, rig }
     }
 }
 
@@ -219,12 +212,12 @@ fn depths_key(rows: &PtDict) -> Option<&'static str> {
 }
 
 /// The number of touches in a file, after every shape in it was checked.
-fn touches(rows: &PtDict) -> Result<usize, PtError> {
+fn touches(rows: &PtDict) -> Result<usize, FileError> {
     let shape = rows.shape(TOUCHED).unwrap_or_default();
     let touches = shape.first().copied().unwrap_or(0).min(MOST_TOUCHES + 1);
     if touches > MOST_TOUCHES {
         let reason = format!("\"{TOUCHED}\" has the shape {shape:?}; at most {MOST_TOUCHES} touches are read");
-        return Err(PtError::TooLarge { file: rows.file().to_owned(), reason });
+        return Err(too_large(rows.file(), &reason));
     }
     rows.check(TOUCHED, touches, &PICTURE)?;
     if let Some(key) = depths_key(rows) {
@@ -238,18 +231,18 @@ fn touches(rows: &PtDict) -> Result<usize, PtError> {
     Ok(touches)
 }
 
-impl Depths {
-    pub(super) fn files(&self, id: PairId) -> Vec<PathBuf> {
-        self.pairs.get(id.0 as usize).map(|(file, _)| self.files[*file as usize].path.clone()).into_iter().collect()
+impl Row {
+    pub(super) fn path(&self) -> &Path {
+        &self.file.path
     }
 
-    pub(super) fn load(&self, id: PairId) -> Result<Loaded, LoadError> {
-        let (file, row) = *self.pairs.get(id.0 as usize).ok_or(LoadError::NoSuchPair { id })?;
-        let (file, at) = (&self.files[file as usize], row as usize);
+    pub(super) fn load(&self, rig: &Arc<Rig>) -> Result<Loaded, FileError> {
+        let (file, at) = (&self.file, self.at);
+        let px_per_m = rig.depth().map_or(lab::GELSLIM_DEPTH.px_per_m, |sensor| sensor.px_per_m);
         let rows = read_dict(&file.path)?;
         let mut notes = Vec::new();
         let of = file.touches;
-        let colors = colors(&rows, at, of, &mut notes)?;
+        let colors = both_colors(&rows, at, of, &mut notes)?;
         let depths = match depths_key(&rows) {
             Some(key) => Some((key, rows.row(key, at, of, &DEPTH)?.into_f32())),
             None => {
@@ -258,20 +251,20 @@ impl Depths {
                 None
             }
         };
-        let half_m = 0.5e-3 * self.width_mm(&rows, file, at, &mut notes);
+        let half_m = 0.5e-3 * self.width_mm(&rows, &mut notes);
         let mut invalid = [InvalidPixels::default(); 2];
         let mut pads = [PadTouch::default(), PadTouch::default()];
         for ((pad, place), color) in PLACES.into_iter().zip(colors) {
             let touch = &mut pads[pad.index()];
-            if let (Some(color), Some(sensor)) = (color, self.rig.first(lab::GELSLIM.kind)) {
+            if let (Some(color), Some(sensor)) = (color, rig.first(lab::GELSLIM.kind)) {
                 touch.set(sensor, color);
             }
-            let (Some((key, depths)), Some(sensor)) = (&depths, self.rig.first(lab::GELSLIM_DEPTH.kind)) else {
+            let (Some((key, depths)), Some(sensor)) = (&depths, rig.first(lab::GELSLIM_DEPTH.kind)) else {
                 continue;
             };
             let values = &depths[place * PIXELS..][..PIXELS];
             let imprint = imprint(values, &mut invalid[pad.index()]);
-            let name = self.rig.pad_key(pad);
+            let name = rig.pad_key(pad);
             most_invalid(rows.file(), invalid[pad.index()].total(), PIXELS, || format!("pixels of the {name} depth"))?;
             if values.iter().any(|v| *v > 0.0) && !values.iter().any(|v| *v < 0.0) {
                 let what =
@@ -283,45 +276,24 @@ impl Depths {
                 let what = format!("key \"{key}\", {name} finger: nothing is deeper than {} mm: meters?", -deepest);
                 notes.push(problem(rows.file(), what, "store depths in millimeters"));
             }
-            let camera = Some(camera(pad, half_m, self.px_per_m()));
+            let camera = Some(camera(pad, half_m, px_per_m));
             touch.set(sensor, DepthTouch { imprint, camera, truth: None });
         }
         let grasp_from_object = pose(&rows, at, of, &mut notes)?;
-        let sample = Sample {
-            rig: self.rig.clone(),
-            pads: pads.map(Some).into(),
-            grasp_from_object,
-            notes,
-            ..Sample::default()
-        };
+        let sample =
+            Sample { rig: rig.clone(), pads: pads.map(Some).into(), grasp_from_object, notes, ..Sample::default() };
         let mut loaded = Loaded { sample, invalid: invalid.map(Some).into() };
         plausible::notes_of(&mut loaded, rows.file(), depths.map_or(DEPTHS[0], |(key, _)| key), false);
         Ok(loaded)
     }
 
-    /// Takes over the file and row of a pair of another one.
-    pub(super) fn take(&mut self, other: &Self, id: PairId) -> (u32, u32) {
-        let (file, row) = other.pairs[id.0 as usize];
-        let file = other.files[file as usize].clone();
-        let at = self.files.iter().position(|known| known.path == file.path).unwrap_or(self.files.len());
-        match self.files.get_mut(at) {
-            Some(known) => *known = file,
-            None => self.files.push(file),
-        }
-        (at as u32, row)
-    }
-
-    fn px_per_m(&self) -> f64 {
-        self.rig.depth().map_or(lab::GELSLIM_DEPTH.px_per_m, |sensor| sensor.px_per_m)
-    }
-
     /// Distance of the gels in a touch, millimeters.
-    fn width_mm(&self, rows: &PtDict, file: &File, at: usize, notes: &mut Vec<Problem>) -> f64 {
+    fn width_mm(&self, rows: &PtDict, notes: &mut Vec<Problem>) -> f64 {
         let own = || {
             let values = rows.tensor(WIDTHS).ok()?.into_f32();
-            values.get(if values.len() == 1 { 0 } else { at }).map(|width| f64::from(*width))
+            values.get(if values.len() == 1 { 0 } else { self.at }).map(|width| f64::from(*width))
         };
-        let width = own().or(file.width_mm).filter(|width| WIDTH_RANGE_MM.contains(width));
+        let width = own().or(self.file.width_mm).filter(|width| WIDTH_RANGE_MM.contains(width));
         width.unwrap_or_else(|| {
             let what = format!("no width of the grasp: the gels are taken to be {ASSUMED_WIDTH_MM} mm apart");
             let hint = format!("save \"{WIDTHS}\" in millimeters, or write {WIDTHS_FILE} with a line `tool: width`");
@@ -332,7 +304,12 @@ impl Depths {
 }
 
 /// The pictures of the right and the left finger.
-fn colors(rows: &PtDict, at: usize, of: usize, notes: &mut Vec<Problem>) -> Result<[Option<ColorTouch>; 2], LoadError> {
+fn both_colors(
+    rows: &PtDict,
+    at: usize,
+    of: usize,
+    notes: &mut Vec<Problem>,
+) -> Result<[Option<ColorTouch>; 2], FileError> {
     let raw = rows.row(TOUCHED, at, of, &PICTURE)?.into_f32();
     if !rows.has(UNTOUCHED) {
         let what = format!("no key \"{UNTOUCHED}\": there is no GelSlim difference");
@@ -340,23 +317,9 @@ fn colors(rows: &PtDict, at: usize, of: usize, notes: &mut Vec<Problem>) -> Resu
         return Ok([None, None]);
     }
     let reference = rows.row(UNTOUCHED, at, of, &PICTURE)?.into_f32();
-    let bad = raw.iter().zip(&reference).filter(|(a, b)| !(a.is_finite() && b.is_finite())).count();
-    most_invalid(rows.file(), bad, raw.len(), || "values of the GelSlim images".into())?;
-    if bad > 0 {
-        let percent = 100.0 * bad as f64 / raw.len() as f64;
-        let what = format!("keys \"{TOUCHED}\", \"{UNTOUCHED}\": {bad} values ({percent:.2} %) are NaN or infinite");
-        notes.push(problem(rows.file(), what, "these values count as no difference"));
-    }
-    let value = |i: usize| {
-        let (a, b) = (raw[i], reference[i]);
-        if a.is_finite() && b.is_finite() { [a, b] } else { [0.0, 0.0] }
-    };
-    let picture = |place: usize, which: usize| -> RgbGrid {
-        Grid::from_fn(WIDTH, HEIGHT, |x, y| {
-            std::array::from_fn(|c| value((3 * place + c) * PIXELS + y * WIDTH + x)[which])
-        })
-    };
-    Ok(PLACES.map(|(_, place)| ColorTouch::from_images(picture(place, 0), picture(place, 1))))
+    let touches =
+        colors::touches(rows.file(), [TOUCHED, UNTOUCHED], [raw, reference], PLACES.map(|(_, place)| place), notes)?;
+    Ok(touches.map(Some))
 }
 
 /// Meters that the gel is pushed in, from the file's millimeters.
@@ -395,7 +358,7 @@ pub(super) fn assumed_camera(rig: &Rig, finger: PadId) -> Option<DepthCamera> {
 }
 
 /// The true pose of a touch, where the file says one.
-fn pose(rows: &PtDict, at: usize, of: usize, notes: &mut Vec<Problem>) -> Result<Option<PlanarPose>, PtError> {
+fn pose(rows: &PtDict, at: usize, of: usize, notes: &mut Vec<Problem>) -> Result<Option<PlanarPose>, FileError> {
     if !rows.has(POSE) {
         let what = format!("no key \"{POSE}\": this file says no true pose");
         notes.push(problem(rows.file(), what, "save the poses if angle errors are wanted"));

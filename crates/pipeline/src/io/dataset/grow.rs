@@ -6,9 +6,10 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 use super::depths;
-use super::lab::{self, FileRef, Lab};
-use super::{Dataset, LoadError, OpenError, RIG_JSON, SAME_NAME, Scan, Source, SourceKind, pictures, problem};
+use super::lab::{self, PairFiles};
+use super::{Dataset, Files, RIG_JSON, SAME_NAME, Scan, Source, SourceKind, error, pictures, problem};
 use crate::io::catch_panic::catch_panic;
+use crate::io::error::FileError;
 use touch2touch_core::dataset::{PairId, Problem};
 use touch2touch_core::rig::PerPad;
 use touch2touch_core::sample::{DepthCamera, Sample};
@@ -29,54 +30,40 @@ impl Dataset {
     /// The data set after its folder was read again: pairs known before keep their ids, also where their files are gone.
     ///
     /// # Errors
-    /// [`OpenError`]; [`OpenError::NothingFound`] also where the folder now holds another kind of data set only.
-    pub fn grown(&self) -> Result<Self, OpenError> {
+    /// [`FileError`]: nothing is found also where the folder now holds another kind of data set only.
+    pub fn grown(&self) -> Result<Self, FileError> {
         let Some(root) = &self.root else { return Ok(self.clone()) };
-        drop(std::fs::read_dir(root).map_err(|source| OpenError::Io { path: root.clone(), source })?);
+        drop(std::fs::read_dir(root).map_err(|err| error::no_folder(root, err))?);
         // Of the same kind: something else that comes into the folder must not hide what is known.
         let scan = match &self.source {
-            Source::Lab(lab) if lab.flat => lab::scan_flat_again(root),
-            Source::Lab(_) => lab::scan(root),
-            Source::Depths(_) => depths::scan(root)?,
-            Source::Pictures(pictures) if pictures.folders.iter().all(|folder| folder != root) => {
-                pictures::scan_folders(root)?
-            }
-            Source::Pictures(_) => pictures::scan(root)?,
+            Source::Lab { flat: true } => lab::scan_flat_again(root),
+            Source::Lab { flat: false } => lab::scan(root),
+            Source::Depths => depths::scan(root)?,
+            Source::Pictures if self.folders.iter().all(|folder| folder != root) => pictures::scan_folders(root)?,
+            Source::Pictures => pictures::scan(root)?,
             Source::BuiltIn(_) => None,
         };
-        let fresh = Self::of(scan.ok_or_else(|| OpenError::NothingFound { path: root.clone(), instead: None })?);
+        let fresh = Self::of(scan.ok_or_else(|| error::nothing_found(root, None))?);
         if *fresh.rig != *self.rig {
             let why = format!("{RIG_JSON} declares other sensors than when the folder was opened: open it again");
-            return Err(OpenError::Rig { path: root.join(RIG_JSON), why });
+            return Err(error::bad_rig(&root.join(RIG_JSON), why));
         }
         let known: BTreeMap<&str, usize> =
             self.index.pairs.iter().enumerate().map(|(at, entry)| (entry.name.as_str(), at)).collect();
-        let mut dataset = Self { problems: fresh.problems.clone(), cameras: OnceLock::new(), ..self.clone() };
+        let Self { index, files, problems, folders, meshes, .. } = fresh;
+        let mut dataset = Self { problems, folders, meshes, cameras: OnceLock::new(), ..self.clone() };
         dataset.problems.extend(dataset.said_read_as());
         if let Some(cameras) = self.cameras.get().filter(|cameras| !cameras.is_empty()) {
             dataset.cameras.set(cameras.clone()).ok();
         }
-        for (at, entry) in fresh.index.pairs.iter().enumerate() {
-            let at = PairId(at as u32);
+        for (entry, files) in index.pairs.into_iter().zip(files) {
             match known.get(entry.name.as_str()) {
-                Some(&old) => {
-                    let old = PairId(old as u32);
-                    if self.pair_files(old) != fresh.pair_files(at) {
-                        dataset.take(&fresh, at, Some(old));
-                    }
-                }
+                Some(&at) => dataset.files[at] = files,
                 None => {
-                    if dataset.take(&fresh, at, None) {
-                        dataset.index.pairs.push(entry.clone());
-                    }
+                    dataset.files.push(files);
+                    dataset.index.pairs.push(entry);
                 }
             }
-        }
-        match (&mut dataset.source, &fresh.source) {
-            (Source::Lab(mine), Source::Lab(other)) => mine.meshes.clone_from(&other.meshes),
-            (Source::Pictures(mine), Source::Pictures(other)) => mine.meshes.clone_from(&other.meshes),
-            (Source::Depths(mine), Source::Depths(other)) => mine.meshes.clone_from(&other.meshes),
-            _ => {}
         }
         Ok(dataset)
     }
@@ -87,13 +74,13 @@ impl Dataset {
         let Some(root) = &self.root else { return Vec::new() };
         let mut out: Vec<Problem> = self.problems.iter().filter(|p| p.what.starts_with(SAME_NAME)).cloned().collect();
         let (flat, mine) = match &self.source {
-            Source::Lab(lab) if lab.flat => (true, "GelSlim .pt files"),
-            Source::Lab(_) => (false, "the lab's folders"),
-            Source::Pictures(_) => (false, "pictures"),
-            Source::Depths(_) | Source::BuiltIn(_) => return out,
+            Source::Lab { flat: true } => (true, "GelSlim .pt files"),
+            Source::Lab { flat: false } => (false, "the lab's folders"),
+            Source::Pictures => (false, "pictures"),
+            Source::Depths | Source::BuiltIn(_) => return out,
         };
-        let (folders, pictures) =
-            (matches!(&self.source, Source::Lab(lab) if !lab.flat), self.kind == SourceKind::Pictures);
+        let pictures = self.kind == SourceKind::Pictures;
+        let folders = !flat && !pictures;
         for (is_mine, what, there) in [
             (folders, "the lab's folders of touches", lab::scan as fn(&Path) -> Option<Scan>),
             (pictures, "pictures of touches", |root| pictures::scan(root).ok().flatten()),
@@ -106,56 +93,24 @@ impl Dataset {
         out
     }
 
-    /// Takes over the files of a pair of `fresh`, for the pair `into` or a further one; not from another kind of source.
-    fn take(&mut self, fresh: &Self, id: PairId, into: Option<PairId>) -> bool {
-        match (&mut self.source, &fresh.source) {
-            (Source::Lab(mine), Source::Lab(other)) => {
-                let mut files = other.pairs[id.0 as usize].clone();
-                for file in [&mut files.gelslim, &mut files.bubble].into_iter().flatten() {
-                    *file =
-                        FileRef { folder: mine.folder_number(&other.folders[file.folder as usize]), ..file.clone() };
-                }
-                put(&mut mine.pairs, files, into);
-            }
-            (Source::Pictures(mine), Source::Pictures(other)) => {
-                put(&mut mine.pairs, other.pairs[id.0 as usize].clone(), into);
-            }
-            (Source::Depths(mine), Source::Depths(other)) => {
-                let row = mine.take(other, id);
-                put(&mut mine.pairs, row, into);
-            }
-            _ => return false,
-        }
-        true
-    }
-
     /// The folders whose content decides which pairs there are.
-    pub fn folders(&self) -> Vec<PathBuf> {
-        match &self.source {
-            Source::Lab(lab) => lab.folders.clone(),
-            Source::Pictures(pictures) => pictures.folders.clone(),
-            Source::Depths(depths) => depths.folders.clone(),
-            Source::BuiltIn(_) => Vec::new(),
-        }
+    pub fn folders(&self) -> &[PathBuf] {
+        &self.folders
     }
 
     /// The GelSlim file of a pair, or the picture that stands for it; `None` where there is none.
     pub fn gelslim_file(&self, id: PairId) -> Option<PathBuf> {
         let first = self.pair_files(id).into_iter().next()?;
-        match &self.source {
-            Source::Lab(lab) => lab.pairs[id.0 as usize].gelslim.is_some().then_some(first),
-            Source::Depths(_) | Source::Pictures(_) | Source::BuiltIn(_) => Some(first),
-        }
+        let bubble_only = matches!(&self.files[id.0 as usize], Files::Lab(halves) if halves.gelslim.is_none());
+        (!bubble_only).then_some(first)
     }
 
     /// The cameras for touches without a bubble: of [`RIG_FILE`] in the root, else of the first bubble file.
     fn cameras(&self) -> &PerPad<Arc<DepthCamera>> {
         self.cameras.get_or_init(|| {
             let named = self.root.iter().map(|root| root.join(RIG_FILE)).find(|file| file.is_file());
-            let first = || match &self.source {
-                Source::Lab(lab) => lab.first_bubble(),
-                Source::Depths(_) | Source::Pictures(_) | Source::BuiltIn(_) => None,
-            };
+            let bubble = |files: &Files| if let Files::Lab(halves) = files { halves.bubble.clone() } else { None };
+            let first = || self.files.iter().find_map(bubble);
             let cameras = named.or_else(first).map(|file| (cameras_of(&file), file));
             match cameras {
                 Some((Ok(cameras), _)) => cameras.map(|camera| camera.map(Arc::new)),
@@ -180,30 +135,6 @@ impl Dataset {
 }
 
 /// The cameras in a bubble file of the lab's; one without camera data has none.
-fn cameras_of(file: &Path) -> Result<PerPad<DepthCamera>, LoadError> {
-    catch_panic(|| Lab::cameras(file))
-        .unwrap_or_else(|message| Err(LoadError::Bug { files: vec![file.to_owned()], message }))
-}
-
-fn put<T>(list: &mut Vec<T>, item: T, at: Option<PairId>) {
-    match at.and_then(|at| list.get_mut(at.0 as usize)) {
-        Some(place) => *place = item,
-        None => list.push(item),
-    }
-}
-
-impl Lab {
-    /// The position of a folder in the list; added if it is new.
-    fn folder_number(&mut self, folder: &Path) -> u32 {
-        let at = self.folders.iter().position(|f| f == folder).unwrap_or_else(|| {
-            self.folders.push(folder.to_owned());
-            self.folders.len() - 1
-        });
-        at as u32
-    }
-
-    fn first_bubble(&self) -> Option<PathBuf> {
-        let file = self.pairs.iter().find_map(|pair| pair.bubble.as_ref())?;
-        Some(self.folders[file.folder as usize].join(&file.name))
-    }
+fn cameras_of(file: &Path) -> Result<PerPad<DepthCamera>, FileError> {
+    catch_panic(|| PairFiles::cameras(file)).unwrap_or_else(|message| Err(error::bug(&[file.to_owned()], &message)))
 }

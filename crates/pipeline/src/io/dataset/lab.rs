@@ -11,19 +11,18 @@
 mod load;
 mod mirrored;
 
-use std::collections::BTreeMap;
-use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use crate::io::catch_panic::catch_panic;
+use crate::io::error::FileError;
 use crate::io::names::is_output;
 use crate::io::pt::read_dict;
-use touch2touch_core::dataset::{PairEntry, PairId, Problem, Split};
+use touch2touch_core::dataset::{PairEntry, Problem, Split};
 use touch2touch_core::rig::{PerPad, Rig};
 use touch2touch_core::sample::DepthCamera;
 
 use super::cad::{CAD_FOLDER, cad_files};
-use super::{LoadError, Loaded, Scan, Source, SourceKind, last_integer, problem, same_name};
+use super::{Files, Loaded, Scan, Source, SourceKind, last_integer, problem, same_name};
 
 const BUBBLES: &str = "bubbles";
 const GELSLIMS: [&str; 2] = ["gelslims", "gelslims_no_distortion"];
@@ -39,26 +38,11 @@ const MAX_DEPTH: usize = 3;
 /// `.pt` files that lie beside touches and are none.
 pub(super) const NO_TOUCH: [&str; 4] = ["rig", "tools", "stats", "training_stats"];
 
-/// The files of the lab's folders, in the order of the index.
-#[derive(Clone, Debug)]
-pub(super) struct Lab {
-    pub(super) folders: Vec<PathBuf>,
-    pub(super) pairs: Vec<PairFiles>,
-    pub(super) meshes: BTreeMap<String, PathBuf>,
-    /// True where the touches lie directly in one folder, as a robot may write them.
-    pub(super) flat: bool,
-}
-
-#[derive(Debug, Clone)]
-pub(super) struct FileRef {
-    pub(super) folder: u32,
-    pub(super) name: OsString,
-}
-
+/// The two halves of a pair.
 #[derive(Clone, Debug)]
 pub(super) struct PairFiles {
-    pub(super) gelslim: Option<FileRef>,
-    pub(super) bubble: Option<FileRef>,
+    pub(super) gelslim: Option<PathBuf>,
+    pub(super) bubble: Option<PathBuf>,
 }
 
 /// A file of one sensor, with what its path says.
@@ -67,17 +51,13 @@ struct Found {
     name: String,
     tool: Option<String>,
     number: u64,
-    file: FileRef,
+    file: PathBuf,
 }
 
 /// A folder that holds `bubbles` and `gelslims`.
 struct Group {
     folder: PathBuf,
     split: Split,
-}
-
-fn has_sensors(folder: &Path) -> bool {
-    folder.join(BUBBLES).is_dir() || GELSLIMS.iter().any(|name| folder.join(name).is_dir())
 }
 
 fn group(folder: PathBuf) -> Option<Group> {
@@ -87,7 +67,8 @@ fn group(folder: PathBuf) -> Option<Group> {
         Some("test_only" | "test") => Split::Test,
         _ => Split::None,
     };
-    has_sensors(&folder).then_some(Group { folder, split })
+    let has_sensors = [BUBBLES].iter().chain(&GELSLIMS).any(|name| folder.join(name).is_dir());
+    has_sensors.then_some(Group { folder, split })
 }
 
 /// The groups in and below `folder`.
@@ -157,14 +138,12 @@ pub(super) fn scan_flat(folder: &Path) -> Option<Scan> {
     /// A folder of this many files of something else is one of something else.
     const MOST_TRIED: usize = 256;
     let scan = scan_flat_again(folder)?;
-    let Source::Lab(lab) = &scan.source else { return None };
-    let files = lab.pairs.iter().filter_map(|pair| pair.gelslim.as_ref());
     // What cannot be read, or makes the reader fail, may be a touch that is still being written.
-    let is_touch = |file: &FileRef| {
-        let read = catch_panic(|| read_dict(&lab.path(file)));
+    let is_touch = |files: &Files| {
+        let read = catch_panic(|| read_dict(&files.list()[0]));
         read.map_or(true, |read| read.map_or(true, |dict| dict.has("gelslim")))
     };
-    files.take(MOST_TRIED).any(is_touch).then_some(scan)
+    scan.files.iter().take(MOST_TRIED).any(is_touch).then_some(scan)
 }
 
 /// [`scan_flat`] of a folder that is known to be one: whatever `.pt` file appears there is a touch, or is said to be none
@@ -191,7 +170,8 @@ impl Scanner {
         pairs.sort_by(|(a, _), (b, _)| {
             (a.split as u8, &a.tool, a.number, &a.name).cmp(&(b.split as u8, &b.tool, b.number, &b.name))
         });
-        let (pairs, files): (Vec<_>, Vec<_>) = pairs.into_iter().unzip();
+        let (pairs, files): (Vec<_>, Vec<_>) =
+            pairs.into_iter().map(|(entry, files)| (entry, Files::Lab(files))).unzip();
         let mut folders = vec![root.join(CAD_FOLDER)];
         folders.extend(groups.iter().map(|g| g.folder.join(CAD_FOLDER)));
         folders.extend(root.parent().map(|p| p.join(CAD_FOLDER)));
@@ -201,7 +181,10 @@ impl Scanner {
             root,
             pairs,
             problems: self.problems,
-            source: Source::Lab(Lab { folders: self.folders, pairs: files, meshes, flat: groups.is_empty() }),
+            source: Source::Lab { flat: groups.is_empty() },
+            files,
+            folders: self.folders,
+            meshes,
             kind: SourceKind::Lab,
             rig: Rig::lab(),
         }
@@ -259,7 +242,7 @@ impl Scanner {
             let Some(first) = bubble.as_ref().or(gelslim.as_ref()) else { break };
             if !one_sensor && gelslim.is_none() {
                 self.problems.push(problem(
-                    self.path(&first.file),
+                    &first.file,
                     format!("its other half is missing: no {} in {}", first.name, GELSLIMS[0]),
                     "add the missing file, or remove this one",
                 ));
@@ -267,7 +250,7 @@ impl Scanner {
             }
             if !one_sensor && bubble.is_none() {
                 self.problems.push(problem(
-                    self.path(&first.file),
+                    &first.file,
                     format!("no {} in {BUBBLES}: it opens without a measured imprint", first.name),
                     "add the bubble file if the truth is wanted",
                 ));
@@ -288,10 +271,6 @@ impl Scanner {
         }
     }
 
-    fn path(&self, file: &FileRef) -> PathBuf {
-        self.folders[file.folder as usize].join(&file.name)
-    }
-
     /// All files of one sensor, sorted by name, each name once. `None` if the folder does not exist.
     fn sensor(&mut self, group: &Path, sensor: &str) -> Option<Vec<Found>> {
         let folder = group.join(sensor);
@@ -308,12 +287,12 @@ impl Scanner {
 
     /// Sorted by name; of files with the same name the first.
     fn each_once(&mut self, mut found: Vec<Found>) -> Vec<Found> {
-        found.sort_by(|a, b| a.name.cmp(&b.name).then_with(|| self.path(&a.file).cmp(&self.path(&b.file))));
+        found.sort_by(|a, b| a.name.cmp(&b.name).then_with(|| a.file.cmp(&b.file)));
         let mut once: Vec<Found> = Vec::with_capacity(found.len());
         for file in found {
             match once.last() {
                 Some(first) if first.name == file.name => {
-                    self.problems.push(same_name(self.path(&file.file), &file.name, &self.path(&first.file)));
+                    self.problems.push(same_name(file.file, &file.name, &first.file));
                 }
                 _ => once.push(file),
             }
@@ -328,7 +307,6 @@ impl Scanner {
             Ok(entries) => entries,
             Err(err) => return self.problems.push(unreadable(err)),
         };
-        let number = self.folders.len() as u32;
         self.folders.push(folder.to_owned());
         let before = out.len();
         let mut below = Vec::new();
@@ -362,12 +340,7 @@ impl Scanner {
                         None => (stem.to_owned(), stem.rfind("_data_").map(|at| stem[..at].to_owned())),
                     };
                     let number_in_name = last_integer(stem);
-                    out.push(Found {
-                        name: name_in_group,
-                        tool,
-                        number: number_in_name,
-                        file: FileRef { folder: number, name },
-                    });
+                    out.push(Found { name: name_in_group, tool, number: number_in_name, file: entry.path() });
                 }
                 (None, Some(_)) => {
                     self.problems.push(problem(
@@ -394,25 +367,14 @@ impl Scanner {
     }
 }
 
-impl Lab {
-    fn path(&self, file: &FileRef) -> PathBuf {
-        self.folders[file.folder as usize].join(&file.name)
-    }
-
-    pub(super) fn files(&self, id: PairId) -> Vec<PathBuf> {
-        let files = self.pairs.get(id.0 as usize);
-        files.into_iter().flat_map(|f| [&f.gelslim, &f.bubble]).flatten().map(|f| self.path(f)).collect()
-    }
-
-    /// The cameras in a bubble file, by finger.
-    pub(super) fn cameras(file: &Path) -> Result<PerPad<DepthCamera>, LoadError> {
-        let sample = load::pair(None, Some(file))?.sample;
+impl PairFiles {
+    /// The cameras of a bubble file.
+    pub(super) fn cameras(bubble: &Path) -> Result<PerPad<DepthCamera>, FileError> {
+        let sample = load::pair(None, Some(bubble))?.sample;
         Ok(sample.pads.map(|touch| touch?.depth()?.camera.clone()))
     }
 
-    pub(super) fn load(&self, id: PairId) -> Result<Loaded, LoadError> {
-        let files = self.pairs.get(id.0 as usize).ok_or(LoadError::NoSuchPair { id })?;
-        let (gelslim, bubble) = (files.gelslim.as_ref(), files.bubble.as_ref());
-        load::pair(gelslim.map(|f| self.path(f)).as_deref(), bubble.map(|f| self.path(f)).as_deref())
+    pub(super) fn load(&self) -> Result<Loaded, FileError> {
+        load::pair(self.gelslim.as_deref(), self.bubble.as_deref())
     }
 }

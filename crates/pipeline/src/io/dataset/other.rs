@@ -59,12 +59,12 @@ mod tests {
                     continue;
                 }
                 let error = Dataset::open(asked).unwrap_err();
-                let (what, hint) = (error.to_string(), error.hint());
+                let (what, hint) = (error.to_string(), error.hint);
                 assert!(what.contains(says) && hint.contains("from_arrays"), "{what}; {hint}");
             }
         }
         let dir = tempfile::tempdir().unwrap();
         let error = Dataset::open(dir.path()).unwrap_err();
-        assert!(!error.hint().contains("from_arrays"), "{error}");
+        assert!(!error.hint.contains("from_arrays"), "{error}");
     }
 }

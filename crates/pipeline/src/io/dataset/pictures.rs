@@ -25,8 +25,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use crate::io::error::{FileError, FileErrorKind};
 use crate::io::images;
-use touch2touch_core::dataset::{PairEntry, PairId, Problem, Split};
+use touch2touch_core::dataset::{PairEntry, Problem, Split};
 use touch2touch_core::grid::{DepthMap, Grid, RgbGrid};
 use touch2touch_core::markers::lab_finger;
 use touch2touch_core::resample;
@@ -38,7 +39,7 @@ use touch2touch_core::upright::{self, TurnReading};
 use self::meters::Depth;
 use super::cad::{CAD_FOLDER, cad_files};
 use super::rig_json::{RIG_JSON, rig_of};
-use super::{LoadError, Loaded, OpenError, Scan, Source, SourceKind, built_in, last_integer, problem, same_name};
+use super::{Files, Loaded, Scan, Source, SourceKind, built_in, last_integer, problem, same_name};
 
 /// Depths that the darkest and the brightest value of a bubble picture are taken for, meters.
 pub(crate) const ASSUMED_IMPRINT_RANGE_M: [f64; 2] = [-0.0063, 0.0180];
@@ -69,26 +70,15 @@ const EXTENSIONS: [&str; 3] = [".png", ".jpg", ".jpeg"];
 /// The untouched image of all touches that have none of their own.
 const COMMON_REFERENCE: &str = "reference";
 
-type Files = [Option<PathBuf>; KINDS];
+type Kinds = [Option<PathBuf>; KINDS];
 
 /// A gray picture (0..255), and what to say of its file.
 type NotedTile = (Grid<f32>, Option<Problem>);
 
-/// The files of a picture folder, in the order of the index.
-#[derive(Clone, Debug)]
-pub(super) struct Pictures {
-    pub(super) pairs: Vec<Touch>,
-    /// The folders that the pictures lie in.
-    pub(super) folders: Vec<PathBuf>,
-    /// The CAD models by tool.
-    pub(super) meshes: BTreeMap<String, PathBuf>,
-    rig: Arc<Rig>,
-}
-
 /// The pictures of a pair.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Touch {
-    files: Files,
+    files: Kinds,
     /// The finger, where it is named.
     finger: Option<PadId>,
     /// True where its tool is named, so that a camera is worth assuming.
@@ -103,7 +93,7 @@ fn suffixes(rig: &Rig) -> [String; KINDS] {
 }
 
 /// Looks for pictures directly in `folder`; `None` if there is no GelSlim or bubble picture.
-pub(super) fn scan(folder: &Path) -> Result<Option<Scan>, OpenError> {
+pub(super) fn scan(folder: &Path) -> Result<Option<Scan>, FileError> {
     let rig = rig_of(folder)?;
     let mut found = Found::default();
     found.look(folder, None, &rig);
@@ -111,7 +101,7 @@ pub(super) fn scan(folder: &Path) -> Result<Option<Scan>, OpenError> {
 }
 
 /// Looks for pictures in the folders in `folder`, each named like the tool of its pictures; `None` if there is none.
-pub(super) fn scan_folders(folder: &Path) -> Result<Option<Scan>, OpenError> {
+pub(super) fn scan_folders(folder: &Path) -> Result<Option<Scan>, FileError> {
     let rig = rig_of(folder)?;
     let mut found = Found::default();
     for (tool, path) in tools::folders(folder) {
@@ -123,7 +113,7 @@ pub(super) fn scan_folders(folder: &Path) -> Result<Option<Scan>, OpenError> {
 /// Touches found in one folder after the other.
 #[derive(Default)]
 struct Found {
-    pairs: Vec<(PairEntry, Files)>,
+    pairs: Vec<(PairEntry, Kinds)>,
     problems: Vec<Problem>,
     /// The folders that hold touches.
     folders: Vec<PathBuf>,
@@ -133,7 +123,7 @@ impl Found {
     /// Takes the pictures directly in `folder`, felt by the sensors of `rig`, of this tool.
     fn look(&mut self, folder: &Path, tool: Option<&str>, rig: &Rig) {
         let suffixes = suffixes(rig);
-        let mut found: BTreeMap<String, Files> = BTreeMap::new();
+        let mut found: BTreeMap<String, Kinds> = BTreeMap::new();
         let mut problems = Vec::new();
         let mut common = None;
         let Ok(entries) = std::fs::read_dir(folder) else { return };
@@ -209,11 +199,11 @@ impl Found {
             return None;
         }
         self.pairs.sort_by(|(a, _), (b, _)| (&a.tool, a.number, &a.name).cmp(&(&b.tool, b.number, &b.name)));
-        let (mut pairs, files): (Vec<PairEntry>, Vec<Files>) = self.pairs.into_iter().unzip();
+        let (mut pairs, files): (Vec<PairEntry>, Vec<Kinds>) = self.pairs.into_iter().unzip();
         let fingers = tools::name(folder, &mut pairs, &rig, &mut self.problems);
         let touches = files.into_iter().zip(fingers).zip(&pairs);
-        let touches =
-            touches.map(|((files, finger), pair)| Touch { files, finger, of_tool: pair.tool.is_some() }).collect();
+        let touches = touches.map(|((files, finger), pair)| Touch { files, finger, of_tool: pair.tool.is_some() });
+        let touches: Vec<Touch> = touches.collect();
         let tools = pairs.iter().filter_map(|pair| pair.tool.as_deref());
         let known = |tool: &str| built_in::mesh(tool).is_some();
         let meshes = cad_files(folder, vec![folder.join(CAD_FOLDER)], tools, known, &mut self.problems);
@@ -221,39 +211,34 @@ impl Found {
             root: folder.to_owned(),
             pairs,
             problems: self.problems,
-            source: Source::Pictures(Pictures { pairs: touches, folders: self.folders, meshes, rig: rig.clone() }),
+            files: touches.into_iter().map(Files::Pictures).collect(),
+            folders: self.folders,
+            meshes,
+            source: Source::Pictures,
             kind: SourceKind::Pictures,
             rig,
         })
     }
 }
 
-impl Pictures {
-    fn touch(&self, id: PairId) -> Result<&Touch, LoadError> {
-        self.pairs.get(id.0 as usize).ok_or(LoadError::NoSuchPair { id })
+impl Touch {
+    fn file(&self, kind: usize) -> Option<&Path> {
+        self.files[kind].as_deref()
     }
 
-    fn file(&self, id: PairId, kind: usize) -> Result<Option<&Path>, LoadError> {
-        Ok(self.touch(id)?.files[kind].as_deref())
-    }
-
-    pub(super) fn files(&self, id: PairId) -> Vec<PathBuf> {
-        let kinds = [GELSLIM, TOUCH, REFERENCE, BUBBLE];
-        self.touch(id)
-            .into_iter()
-            .flat_map(|touch| kinds.iter().filter_map(|&kind| touch.files[kind].clone()))
-            .collect()
+    pub(super) fn list(&self) -> Vec<PathBuf> {
+        [GELSLIM, TOUCH, REFERENCE, BUBBLE].iter().filter_map(|&kind| self.files[kind].clone()).collect()
     }
 
     /// A gray picture that lay this way in its file, upright.
-    pub(super) fn tile(&self, id: PairId, kind: usize, laid: Turn) -> Result<Option<Grid<f32>>, LoadError> {
-        Ok(self.tile_and_note(id, kind, laid)?.map(|(tile, _)| tile))
+    pub(super) fn tile(&self, rig: &Rig, kind: usize, laid: Turn) -> Result<Option<Grid<f32>>, FileError> {
+        Ok(self.tile_and_note(rig, kind, laid)?.map(|(tile, _)| tile))
     }
 
     /// The picture of [`Self::tile`], and what to say of its file.
-    fn tile_and_note(&self, id: PairId, kind: usize, laid: Turn) -> Result<Option<NotedTile>, LoadError> {
-        let Some(path) = self.file(id, kind)? else { return Ok(None) };
-        let sensor = self.rig.depth().unwrap_or(&lab::BUBBLE);
+    fn tile_and_note(&self, rig: &Rig, kind: usize, laid: Turn) -> Result<Option<NotedTile>, FileError> {
+        let Some(path) = self.file(kind) else { return Ok(None) };
+        let sensor = rig.depth().unwrap_or(&lab::BUBBLE);
         let (tile, note) = match meters::read(path, sensor)? {
             Depth::Levels(found) => found,
             Depth::Meters(imprint) => (tile_from_imprint(&imprint, sensor), None),
@@ -264,43 +249,46 @@ impl Pictures {
     }
 
     /// The upright difference image, and how it lay where the colors tell.
-    fn difference(&self, id: PairId) -> Result<Option<(RgbGrid, Option<TurnReading>)>, LoadError> {
-        let Some(path) = self.file(id, GELSLIM)? else { return Ok(None) };
+    fn difference(&self, rig: &Rig) -> Result<Option<(RgbGrid, Option<TurnReading>)>, FileError> {
+        let Some(path) = self.file(GELSLIM) else { return Ok(None) };
         let difference = difference_from_tile(&images::read_rgb(path)?);
         // The light of a GelSlim tells how its picture lay; nothing is known of other sensors' light.
-        let tells = self.rig.color().is_some_and(|sensor| sensor.key == lab::GELSLIM.key);
+        let tells = rig.color().is_some_and(|sensor| sensor.key == lab::GELSLIM.key);
         let reading = tells.then(|| upright::best(&difference)).flatten();
         let upright = reading.map_or_else(|| difference.clone(), |found| found.turn.undo(&difference));
         Ok(Some((upright, reading)))
     }
 
     /// True where a channel of the GelSlim picture was cut off at black or white: half of its range is lost.
-    pub(super) fn is_clipped(&self, id: PairId) -> Result<Option<bool>, LoadError> {
-        let Some(path) = self.file(id, 0)? else { return Ok(None) };
+    pub(super) fn is_clipped(&self) -> Result<Option<bool>, FileError> {
+        let Some(path) = self.file(GELSLIM) else { return Ok(None) };
         let tile = images::read_rgb(path)?;
         Ok(Some((0..3).any(|channel| matches!(mode(&tile, channel), 0 | 255))))
     }
 
     /// The pair as the first pad's touch, whichever it was ([`Sample::taken_by`]).
-    pub(super) fn load(&self, id: PairId) -> Result<Loaded, LoadError> {
-        let named = self.touch(id)?;
+    pub(super) fn load(&self, rig: &Arc<Rig>) -> Result<Loaded, FileError> {
         let mut notes = Vec::new();
         let mut touch = PadTouch::default();
         let mut scale = Scale::Assumed;
         let mut reading = None;
         // A picture of a kind that the rig does not have is kept behind its sensors.
-        let place = |kind| self.rig.first(kind).unwrap_or(SensorId(self.rig.sensors.len() as u8));
+        let place = |kind| rig.first(kind).unwrap_or(SensorId(rig.sensors.len() as u8));
         let (color_id, depth_id) = (place(SensorKind::Color), place(SensorKind::Depth));
-        if let (Some(touched), Some(reference)) = (self.file(id, TOUCH)?, self.file(id, REFERENCE)?) {
+        if let (Some(touched), Some(reference)) = (self.file(TOUCH), self.file(REFERENCE)) {
             let (raw, untouched) = (images::read_rgb(touched)?, images::read_rgb(reference)?);
             let sizes = [raw.size(), untouched.size()];
-            let color = ColorTouch::from_images(raw, untouched);
-            touch.set(color_id, color.ok_or_else(|| LoadError::Sizes { file: touched.to_owned(), sizes })?);
+            let color = ColorTouch::from_images(raw, untouched).ok_or_else(|| {
+                let what = format!("the touched image has {:?} pixels, the untouched one {:?}", sizes[0], sizes[1]);
+                FileError::new(touched, what, "take both images with the same camera settings")
+                    .of_kind(FileErrorKind::Content)
+            })?;
+            touch.set(color_id, color);
             // The model's meters are its own; only a bubble picture has none.
             scale = Scale::Measured;
-        } else if let Some((difference, read)) = self.difference(id)? {
+        } else if let Some((difference, read)) = self.difference(rig)? {
             reading = read;
-            let path = self.file(id, GELSLIM)?.unwrap_or(Path::new(""));
+            let path = self.file(GELSLIM).unwrap_or(Path::new(""));
             notes.extend(read.filter(|read| read.is_guess()).map(|read| unsure(path, read)));
             if difference.as_slice().iter().all(|p| *p == [0.0; 3]) {
                 notes.push(problem(path, "the picture is a single color", "check that the right picture was saved"));
@@ -308,7 +296,7 @@ impl Pictures {
             touch.set(color_id, ColorTouch { images: None, difference });
         }
         let laid = reading.map_or_else(Turn::default, |read| read.turn);
-        for file in self.files(id) {
+        for file in self.list() {
             let behind = images::bytes_behind(&file);
             if behind > 0 {
                 let what = format!("{behind} bytes stand behind the end of the JPEG");
@@ -316,17 +304,17 @@ impl Pictures {
             }
         }
         let dots = || lab_finger(&touch.color()?.difference).filter(|_| reading.is_some());
-        let taken_by = named.finger.or_else(dots);
-        let sensor = self.rig.depth().unwrap_or(&lab::BUBBLE);
-        let of_tool = || named.of_tool.then(|| tools::camera(&self.rig, taken_by.unwrap_or(lab::RIGHT))).flatten();
-        if let Some(path) = self.file(id, BUBBLE)?.filter(|path| meters::has_any(path))
+        let taken_by = self.finger.or_else(dots);
+        let sensor = rig.depth().unwrap_or(&lab::BUBBLE);
+        let of_tool = || self.of_tool.then(|| tools::camera(rig, taken_by.unwrap_or(lab::RIGHT))).flatten();
+        if let Some(path) = self.file(BUBBLE).filter(|path| meters::has_any(path))
             && let Depth::Meters(imprint) = meters::read(path, sensor)?
         {
             touch.set(depth_id, DepthTouch { imprint, camera: of_tool(), truth: None });
-        } else if let Some((tile, note)) = self.tile_and_note(id, BUBBLE, laid)? {
+        } else if let Some((tile, note)) = self.tile_and_note(rig, BUBBLE, laid)? {
             notes.extend(note);
             let [w, h] = tile.size();
-            let path = self.file(id, BUBBLE)?.unwrap_or(Path::new(""));
+            let path = self.file(BUBBLE).unwrap_or(Path::new(""));
             if w < 16 || h < 16 {
                 notes.push(problem(
                     path,
@@ -337,12 +325,12 @@ impl Pictures {
             if tile.as_slice().windows(2).all(|v| v[0] == v[1]) {
                 notes.push(problem(path, "the picture is a single gray", "check that the right picture was saved"));
             }
-            let imprint = imprint_from_tile(&tile, &self.rig);
+            let imprint = imprint_from_tile(&tile, rig);
             touch.set(depth_id, DepthTouch { imprint, camera: of_tool(), truth: None });
             scale = Scale::Assumed;
         }
-        let pads = self.rig.pads().map(|pad| (pad.index() == 0).then(|| touch.clone())).collect();
-        let rig = self.rig.clone();
+        let pads = rig.pads().map(|pad| (pad.index() == 0).then(|| touch.clone())).collect();
+        let rig = rig.clone();
         let sample = Sample { rig, pads, grasp_from_object: None, scale, laid, reading, taken_by, notes };
         Ok(Loaded { sample, invalid: Default::default() })
     }

@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use super::{Dataset, OpenError, problem};
+use super::{Dataset, problem};
+use crate::io::error::FileError;
 use crate::io::{atomic, files};
 use touch2touch_core::dataset::Problem;
 use touch2touch_core::read_as::{ReadAs, list, parse_list};
@@ -18,12 +19,16 @@ const MAX_BYTES: u64 = 4096;
 ///
 /// # Errors
 /// If the file is there and cannot be read, or says something else.
-pub(super) fn of(root: &Path) -> Result<Vec<ReadAs>, OpenError> {
+pub(super) fn of(root: &Path) -> Result<Vec<ReadAs>, FileError> {
     let file = root.join(READ_AS_FILE);
+    let bad = |reason: String| {
+        let what = format!("how the data are to be read is not understood: {reason}");
+        FileError::new(&file, what, "correct that file, or remove it to read the data as they are stored")
+    };
     match files::read_to_string(&file, MAX_BYTES) {
-        Ok(text) => parse_list(&text).map_err(|reason| OpenError::ReadAs { file, reason }),
+        Ok(text) => parse_list(&text).map_err(bad),
         Err(err) if err.kind() == std::io::ErrorKind::NotFound => Ok(Vec::new()),
-        Err(err) => Err(OpenError::ReadAs { file, reason: format!("it cannot be read: {err}") }),
+        Err(err) => Err(bad(format!("it cannot be read: {err}"))),
     }
 }
 

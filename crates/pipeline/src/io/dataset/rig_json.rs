@@ -3,7 +3,8 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use super::OpenError;
+use super::error::bad_rig;
+use crate::io::error::FileError;
 use crate::io::files;
 use touch2touch_core::rig::Rig;
 
@@ -13,8 +14,8 @@ pub const RIG_JSON: &str = "rig.json";
 /// The sensors that a folder declares in its [`RIG_JSON`], else the lab's.
 ///
 /// # Errors
-/// [`OpenError::Rig`] if the file is there and cannot be read or declares no rig.
-pub fn rig_of(folder: &Path) -> Result<Arc<Rig>, OpenError> {
+/// [`FileError`] if the file is there and cannot be read or declares no rig.
+pub fn rig_of(folder: &Path) -> Result<Arc<Rig>, FileError> {
     let path = folder.join(RIG_JSON);
     // A link that leads nowhere is there.
     if path.symlink_metadata().is_err_and(|err| err.kind() == std::io::ErrorKind::NotFound) {
@@ -24,5 +25,5 @@ pub fn rig_of(folder: &Path) -> Result<Arc<Rig>, OpenError> {
         Ok(text) => Rig::parse(&text).map_err(|why| format!("{RIG_JSON} does not declare a rig: {why}")),
         Err(err) => Err(format!("{RIG_JSON} cannot be read: {err}")),
     };
-    rig.map(Arc::new).map_err(|why| OpenError::Rig { path, why })
+    rig.map(Arc::new).map_err(|why| bad_rig(&path, why))
 }

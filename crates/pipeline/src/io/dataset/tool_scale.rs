@@ -6,7 +6,8 @@ use std::str::FromStr;
 use strum::{EnumIter, IntoEnumIterator as _};
 
 use super::problem;
-use crate::io::stl::{self, MeshError};
+use crate::io::error::{FileError, FileErrorKind};
+use crate::io::stl;
 use crate::io::{atomic, files};
 use touch2touch_core::dataset::Problem;
 use touch2touch_core::mesh::TriMesh;
@@ -33,37 +34,30 @@ pub enum ToolUnit {
 }
 
 impl ToolUnit {
+    /// Key, name, and meters of one.
+    fn row(self) -> (&'static str, &'static str, f64) {
+        match self {
+            Self::Millimeters => ("mm", "millimeters", 1e-3),
+            Self::Centimeters => ("cm", "centimeters", 1e-2),
+            Self::Meters => ("m", "meters", 1.0),
+            Self::Micrometers => ("um", "micrometers", 1e-6),
+            Self::Inches => ("in", "inches", 0.0254),
+        }
+    }
+
     /// The word in [`UNIT_FILE`] and on the command line.
     pub fn key(self) -> &'static str {
-        match self {
-            Self::Millimeters => "mm",
-            Self::Centimeters => "cm",
-            Self::Meters => "m",
-            Self::Micrometers => "um",
-            Self::Inches => "in",
-        }
+        self.row().0
     }
 
     /// The name on screen.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Millimeters => "millimeters",
-            Self::Centimeters => "centimeters",
-            Self::Meters => "meters",
-            Self::Micrometers => "micrometers",
-            Self::Inches => "inches",
-        }
+        self.row().1
     }
 
     /// One of it, meters.
     pub fn meters(self) -> f64 {
-        match self {
-            Self::Millimeters => 1e-3,
-            Self::Centimeters => 1e-2,
-            Self::Meters => 1.0,
-            Self::Micrometers => 1e-6,
-            Self::Inches => 0.0254,
-        }
+        self.row().2
     }
 
     /// The units in which something of this size is as large as a hand-held tool.
@@ -125,8 +119,10 @@ impl FromStr for ToolScale {
 
 impl ToolScale {
     /// Scale that [`UNIT_FILE`] beside `model` names; `None` without one.
-    fn beside(model: &Path) -> Result<Option<Self>, MeshError> {
-        let unknown = |reason| MeshError::UnitFile { file: model.with_file_name(UNIT_FILE), reason };
+    fn beside(model: &Path) -> Result<Option<Self>, FileError> {
+        let hint = "write m, cm, mm, um, in, auto or a factor to meters into the file";
+        let file = || model.with_file_name(UNIT_FILE);
+        let unknown = |reason: String| FileError::new(file(), reason, hint).of_kind(FileErrorKind::Unit);
         said_beside(model)?.map(|text| text.parse().map_err(unknown)).transpose()
     }
 }
@@ -135,12 +131,12 @@ impl ToolScale {
 ///
 /// # Errors
 /// If it is there and cannot be read.
-pub(crate) fn said_beside(model: &Path) -> Result<Option<String>, MeshError> {
+pub(crate) fn said_beside(model: &Path) -> Result<Option<String>, FileError> {
     let file: PathBuf = model.with_file_name(UNIT_FILE);
     match files::read_to_string(&file, MAX_UNIT_BYTES) {
         Ok(text) => Ok(Some(text.trim().to_owned())),
         Err(err) if err.kind() == std::io::ErrorKind::NotFound => Ok(None),
-        Err(source) => Err(MeshError::Io { file, source }),
+        Err(err) => Err(FileError::io(file, "cannot access the mesh", err)),
     }
 }
 
@@ -148,7 +144,7 @@ pub(crate) fn said_beside(model: &Path) -> Result<Option<String>, MeshError> {
 ///
 /// # Errors
 /// If it cannot be read.
-pub(crate) fn tool_size(path: &Path) -> Result<f64, MeshError> {
+pub(crate) fn tool_size(path: &Path) -> Result<f64, FileError> {
     let bounds = stl::read(path)?.mesh.bounds();
     Ok(bounds.map_or(0.0, |[lo, hi]| (hi - lo).max_element()))
 }
@@ -174,9 +170,9 @@ pub struct ToolFile {
 /// verdict on CAD files, for the doctor and for whoever uses them.
 ///
 /// # Errors
-/// [`MeshError`]; [`MeshError::Unit`], with the factor that would fit, if the model cannot be in meters, and
-/// [`MeshError::NotATool`] if no unit makes it a tool, or not the one that was named.
-pub(crate) fn read_tool(path: &Path, scale: Option<ToolScale>) -> Result<ToolFile, MeshError> {
+/// [`FileError`]; [`FileErrorKind::Unit`], with the factor that would fit, if the model cannot be in meters, and if no unit
+/// makes it a tool, or not the one that was named.
+pub(crate) fn read_tool(path: &Path, scale: Option<ToolScale>) -> Result<ToolFile, FileError> {
     let (scale, said_by) = match scale {
         Some(scale) => (scale, "the caller".to_owned()),
         None => (ToolScale::beside(path)?.unwrap_or_default(), format!("{}", path.with_file_name(UNIT_FILE).display())),
@@ -184,7 +180,15 @@ pub(crate) fn read_tool(path: &Path, scale: Option<ToolScale>) -> Result<ToolFil
     let stl::StlFile { mut mesh, degenerate, mended, .. } = stl::read(path)?;
     let size = mesh.bounds().map_or(0.0, |[lo, hi]| (hi - lo).max_element());
     let fitting = scale_to_meters(size);
-    let not_a_tool = |unit: String| MeshError::NotATool { file: path.to_owned(), size, unit };
+    let wrong = |what: String, hint| {
+        let what = format!("the CAD model is {} long{what}", stl::number(size));
+        FileError::new(path, what, hint).of_kind(FileErrorKind::Unit)
+    };
+    let not_a_tool = |unit: String| {
+        let hint =
+            "tools are 4 mm to 0.4 m long: name the right unit in unit.txt beside the model, or export the model again";
+        wrong(format!(": that is no tool {unit}"), hint)
+    };
     let factor = match (scale, fitting) {
         (ToolScale::Factor(factor), _) if is_tool_length(size * factor) => factor,
         (ToolScale::Factor(factor), fitting) => {
@@ -193,7 +197,11 @@ pub(crate) fn read_tool(path: &Path, scale: Option<ToolScale>) -> Result<ToolFil
         }
         (ToolScale::Auto, Some(factor)) => factor,
         (ToolScale::Meters, Some(1.0)) => 1.0,
-        (ToolScale::Meters, Some(offered)) => return Err(MeshError::Unit { file: path.to_owned(), size, offered }),
+        (ToolScale::Meters, Some(offered)) => {
+            let hint = "accept the scale with `touch2touch doctor --set` or the button at the 3D view: a file unit.txt beside the \
+                        model says auto, m, cm, mm, um, in or a factor";
+            return Err(wrong(format!(", which cannot be meters: scale it by {offered}"), hint));
+        }
         (ToolScale::Meters | ToolScale::Auto, None) => return Err(not_a_tool("in meters or any other unit".into())),
     };
     if factor != 1.0 {
@@ -222,7 +230,7 @@ pub(crate) fn read_tool(path: &Path, scale: Option<ToolScale>) -> Result<ToolFil
 ///
 /// # Errors
 /// As [`read_tool`].
-pub fn read_in_meters(path: &Path, scale: Option<ToolScale>) -> Result<TriMesh, MeshError> {
+pub fn read_in_meters(path: &Path, scale: Option<ToolScale>) -> Result<TriMesh, FileError> {
     read_tool(path, scale).map(|file| file.mesh)
 }
 
@@ -256,8 +264,8 @@ mod tests {
         for unit in [1e-3, 1e-6] {
             write(&path, unit);
             let error = read_in_meters(&path, None).unwrap_err();
-            assert!(matches!(error, MeshError::Unit { offered, .. } if (offered - unit).abs() < 1e-12), "{error}");
-            assert!(error.to_string().contains("t.stl") && error.hint().contains("auto"));
+            assert!(error.what.contains(&format!("scale it by {unit}")), "{error}");
+            assert!(error.to_string().contains("t.stl") && error.hint.contains("auto"));
             assert!((length(&read_in_meters(&path, Some(ToolScale::Auto)).unwrap()) - 0.04).abs() < 1e-8);
         }
         // Beside the models it holds for the studio as well; the caller's word counts more.
@@ -266,7 +274,7 @@ mod tests {
         assert!(read_in_meters(&path, Some(ToolScale::Meters)).is_err());
         std::fs::write(dir.path().join(UNIT_FILE), "furlong").unwrap();
         let error = read_in_meters(&path, None).unwrap_err();
-        assert!(error.to_string().contains("furlong") && error.file().ends_with(UNIT_FILE), "{error}");
+        assert!(error.to_string().contains("furlong") && error.file.ends_with(UNIT_FILE), "{error}");
     }
 
     #[test]
@@ -278,7 +286,7 @@ mod tests {
             write(&path, unit);
             for scale in [None, Some(ToolScale::Auto), Some(ToolScale::Meters), Some(ToolScale::Factor(1.0))] {
                 let error = read_tool(&path, scale).unwrap_err();
-                assert!(matches!(error, MeshError::NotATool { .. }) && error.to_string().contains("t.stl"), "{error}");
+                assert!(error.what.contains("no tool") && error.to_string().contains("t.stl"), "{error}");
                 assert!(error.to_string().len() < 200 + path.as_os_str().len(), "{error}");
             }
         }

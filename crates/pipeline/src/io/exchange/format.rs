@@ -5,7 +5,8 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use strum::{EnumIter, EnumString, IntoStaticStr};
 
-use super::{Content, ExportError};
+use super::Content;
+use crate::io::error::FileError;
 use crate::io::images;
 use touch2touch_core::grid::{Grid, Mask};
 
@@ -52,7 +53,7 @@ impl Format {
 }
 
 /// Writes a mask alone into the folder of its part, as a picture, and its ignored pixels where there are any.
-pub(super) fn write_masks(part: &Path, stem: &str, content: &Content) -> Result<(), ExportError> {
+pub(super) fn write_masks(part: &Path, stem: &str, content: &Content) -> Result<(), FileError> {
     images::write_gray8(&part.join(format!("{stem}.png")), &gray(&content.mask))?;
     if let Some(ignored) = &content.ignored {
         images::write_gray8(&part.join(format!("{stem}{IGNORE_PNG}")), &gray(ignored))?;

@@ -4,17 +4,18 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::format::IGNORE_PNG;
-use super::found::{Listed, Listing, ReadError};
+use super::found::{Listed, Listing};
 use super::{Format, IGNORED, Manifest, PARTS};
+use crate::io::error::FileError;
 
 /// The masks of a folder, of an export or of one of its parts, or of one file; in the form named, else in the one that lies
 /// there. No pixels are read.
 ///
 /// # Errors
 /// If the form cannot be told.
-pub fn list(path: &Path, format: Option<Format>) -> Result<Listing, ReadError> {
+pub fn list(path: &Path, format: Option<Format>) -> Result<Listing, FileError> {
     if !path.exists() {
-        return Err(ReadError::new(path, "there is no such file or folder", "name the folder of an export, or a file"));
+        return Err(FileError::new(path, "there is no such file or folder", "name the folder of an export, or a file"));
     }
     let manifest = path.ancestors().take(4).find_map(Manifest::read);
     let known = manifest.as_ref().map(|manifest| manifest.masks);
@@ -28,7 +29,7 @@ pub fn list(path: &Path, format: Option<Format>) -> Result<Listing, ReadError> {
     apart(&mut listing);
     if listing.masks.is_empty() && listing.refused.is_empty() {
         let what = format!("there are no masks in the form \"{}\"", format.key());
-        return Err(ReadError::new(path, what, "name the folder of an export, or another form"));
+        return Err(FileError::new(path, what, "name the folder of an export, or another form"));
     }
     Ok(listing)
 }
@@ -42,7 +43,7 @@ fn apart(listing: &mut Listing) {
     let twice: Vec<Listed> = twice;
     listing.refused.extend(twice.into_iter().map(|listed| {
         let what = format!("{} masks have the name {}", counts[&listed.stem], listed.stem);
-        ReadError::new(&listed.file, what, "take the others away")
+        FileError::new(&listed.file, what, "take the others away")
     }));
 }
 
@@ -96,17 +97,17 @@ fn listed(file: &Path, format: Format, stems: &BTreeMap<String, (String, String)
 }
 
 /// The form that lies in a place.
-fn recognized(path: &Path) -> Result<Format, ReadError> {
+fn recognized(path: &Path) -> Result<Format, FileError> {
     if path.is_file() {
         return match path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("png")) {
             true if path.parent().is_some_and(|folder| folder.ends_with("masks")) => Ok(Format::Unet),
             true => Ok(Format::Png),
-            false => Err(ReadError::new(path, "this is no file of masks", "name a .png")),
+            false => Err(FileError::new(path, "this is no file of masks", "name a .png")),
         };
     }
     // Images lie in folders of their own: pictures are masks only where nothing else is.
     let there = [Format::Unet, Format::Png].into_iter().find(|format| !files_of(path, *format).is_empty());
     there.ok_or_else(|| {
-        ReadError::new(path, "there are no masks here", "name the folder of an export, or a file of masks")
+        FileError::new(path, "there are no masks here", "name the folder of an export, or a file of masks")
     })
 }

@@ -6,7 +6,7 @@ use sha2::Digest as _;
 
 use touch2touch_core::rig::Rig;
 
-use super::{ExportConfig, ExportEntry};
+use super::{ExportChoice, ExportEntry};
 
 /// Shares of the pairs that go to validation and to test.
 const VAL: f64 = 0.1;
@@ -21,14 +21,14 @@ fn hash(seed: u64, text: &str) -> [u8; 32] {
 
 /// The part (0 train, 1 val, 2 test) of each entry, by its group's name and the seed alone: entries that come later
 /// change nothing for those before, but where a part would be empty.
-pub(super) fn parts(entries: &[ExportEntry], config: &ExportConfig) -> Vec<usize> {
+pub(super) fn parts(entries: &[ExportEntry], choice: &ExportChoice) -> Vec<usize> {
     let group = |entry: &'_ ExportEntry| match &entry.tool {
-        Some(tool) if config.by_tool => tool.clone(),
+        Some(tool) if choice.by_tool => tool.clone(),
         _ => entry.pair.clone(),
     };
-    let is_unseen = |entry: &ExportEntry| entry.held_out && !config.held_out_in_train;
+    let is_unseen = |entry: &ExportEntry| entry.held_out && !choice.test_in_train;
     let place = |name: &str| {
-        let [a, b, c, d, e, f, g, h, ..] = hash(config.seed, name);
+        let [a, b, c, d, e, f, g, h, ..] = hash(choice.seed, name);
         u64::from_be_bytes([a, b, c, d, e, f, g, h]) as f64 / 2f64.powi(64)
     };
     let names: BTreeSet<String> = entries.iter().filter(|e| !is_unseen(e)).map(group).collect();
@@ -144,7 +144,7 @@ mod tests {
     #[test]
     fn parts_depend_on_names_and_seed_only() {
         let list = entries(500);
-        let config = ExportConfig::default();
+        let config = ExportChoice::default();
         let here = parts(&list, &config);
         let [train, val, test] = counts(&here);
         assert!((750..850).contains(&train) && (70..130).contains(&val) && (70..130).contains(&test), "{train} {val}");
@@ -155,30 +155,30 @@ mod tests {
         back.reverse();
         assert_eq!(back, here);
         assert_eq!(parts(&list[..600], &config), here[..600], "what comes later changes nothing before");
-        assert_ne!(parts(&list, &ExportConfig { seed: 1, ..config.clone() }), here);
+        assert_ne!(parts(&list, &ExportChoice { seed: 1, ..config }), here);
     }
 
     #[test]
     fn no_wanted_part_is_empty_as_soon_as_every_part_can_have_one() {
         for n in 3..12 {
             for seed in 0..40 {
-                let config = ExportConfig { seed, ..ExportConfig::default() };
+                let config = ExportChoice { seed, ..ExportChoice::default() };
                 let counts = counts(&parts(&entries(n), &config));
                 assert!(counts.iter().all(|&n| n > 0), "{n} pairs, seed {seed}: {counts:?}");
             }
         }
-        assert_eq!(counts(&parts(&entries(1), &ExportConfig::default())).iter().sum::<usize>(), 2);
+        assert_eq!(counts(&parts(&entries(1), &ExportChoice::default())).iter().sum::<usize>(), 2);
     }
 
     #[test]
     fn what_is_held_out_never_trains_and_tools_stay_together() {
         let mut list = entries(200);
         list.iter_mut().take(100).for_each(|entry| entry.held_out = true);
-        let out = parts(&list, &ExportConfig::default());
+        let out = parts(&list, &ExportChoice::default());
         assert!(out[..100].iter().all(|&p| p == 2) && out[100..].contains(&0));
-        let asked = ExportConfig { held_out_in_train: true, ..ExportConfig::default() };
+        let asked = ExportChoice { test_in_train: true, ..ExportChoice::default() };
         assert!(parts(&list, &asked)[..100].contains(&0));
-        let by_tool = parts(&list[100..], &ExportConfig { by_tool: true, ..ExportConfig::default() });
+        let by_tool = parts(&list[100..], &ExportChoice { by_tool: true, ..ExportChoice::default() });
         let of = |tool: &str| {
             let mine = list[100..].iter().zip(&by_tool).filter(|(e, _)| e.tool.as_deref() == Some(tool));
             mine.map(|(_, part)| *part).collect::<BTreeSet<_>>()

@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::{MaskStore, StoreError};
+use super::{MaskStore, refused};
+use crate::io::error::FileError;
 use crate::io::{atomic, files, names};
 
 /// The file that is locked while labels are written.
@@ -18,15 +19,15 @@ impl MaskStore {
     /// nothing is kept out.
     ///
     /// # Errors
-    /// [`StoreError::Lost`], and [`StoreError::Io`] where something lies in the lock's place that is no ordinary file.
-    pub fn hold(&self) -> Result<Option<File>, StoreError> {
+    /// [`FileError`] where the data set was moved, or something lies in the lock's place that is no ordinary file.
+    pub fn hold(&self) -> Result<Option<File>, FileError> {
         const WHAT: &str = "lock the labels";
         self.make_folder(WHAT)?;
         let file = self.folder.join(LOCK);
         match files::append(&file) {
             Ok(open) => Ok(open.lock().is_ok().then_some(open)),
             Err(source) if matches!(source.kind(), ErrorKind::InvalidInput | ErrorKind::IsADirectory) => {
-                Err(StoreError::Io { file, what: WHAT, source })
+                Err(refused(&file, WHAT, source))
             }
             Err(_) => Ok(None),
         }
@@ -40,11 +41,11 @@ impl MaskStore {
     /// Appends a line to the journal of a pair: who did what, before and after. Nothing is ever removed from it.
     ///
     /// # Errors
-    /// [`StoreError::Lost`] and [`StoreError::Io`].
-    pub fn append_journal(&self, pair: &str, line: &impl Serialize) -> Result<(), StoreError> {
+    /// [`FileError`].
+    pub fn append_journal(&self, pair: &str, line: &impl Serialize) -> Result<(), FileError> {
         const WHAT: &str = "write the journal";
         let file = self.journal_file(pair);
-        let io = |source| StoreError::Io { file: file.clone(), what: WHAT, source };
+        let io = |err| refused(&file, WHAT, err);
         self.make_folder(WHAT)?;
         let mut bytes = serde_json::to_vec(line).map_err(|err| io(err.into()))?;
         bytes.push(b'\n');
@@ -66,12 +67,12 @@ impl MaskStore {
     /// The lines of the journal of a pair; empty if there is none.
     ///
     /// # Errors
-    /// [`StoreError::Io`].
-    pub fn journal(&self, pair: &str) -> Result<Vec<u8>, StoreError> {
+    /// [`FileError`].
+    pub fn journal(&self, pair: &str) -> Result<Vec<u8>, FileError> {
         let file = self.journal_file(pair);
         match files::read(&file, files::SMALL) {
             Err(err) if err.kind() == ErrorKind::NotFound => Ok(Vec::new()),
-            read => read.map_err(|source| StoreError::Io { file, what: "read the journal", source }),
+            read => read.map_err(|err| refused(&file, "read the journal", err)),
         }
     }
 }

@@ -158,11 +158,11 @@ impl Header {
 
 /// The whole file of an array.
 pub(super) fn bytes(shape: &[usize], values: &Values) -> Vec<u8> {
-    let (descr, content) = match values {
-        Values::F32(v) => ("<f4", v.iter().flat_map(|x| x.to_le_bytes()).collect()),
-        Values::F64(v) => ("<f8", v.iter().flat_map(|x| x.to_le_bytes()).collect()),
-        Values::U8(v) => ("|u1", v.clone()),
-        Values::I64(v) => ("<i8", v.iter().flat_map(|x| x.to_le_bytes()).collect()),
+    let descr = match values {
+        Values::F32(_) => "<f4",
+        Values::F64(_) => "<f8",
+        Values::U8(_) => "|u1",
+        Values::I64(_) => "<i8",
     };
     // A tuple of one has a comma in Python.
     let sizes: String = shape.iter().map(|n| format!("{n}, ")).collect();
@@ -176,7 +176,7 @@ pub(super) fn bytes(shape: &[usize], values: &Values) -> Vec<u8> {
     // A shape of a few numbers is far shorter than this.
     out.extend((header.len() as u16).to_le_bytes());
     out.extend(header.bytes());
-    out.extend::<Vec<u8>>(content);
+    out.extend(values.bytes());
     out
 }
 

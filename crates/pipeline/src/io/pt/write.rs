@@ -6,8 +6,9 @@ use std::path::Path;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
-use super::{PtError, Tensor, Values};
+use super::{Tensor, Values};
 use crate::io::archive;
+use crate::io::error::FileError;
 
 /// A value of the dict to be written.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,22 +37,18 @@ const ALIGNMENT: u16 = 64;
 /// The bytes depend on the content only. The file is written beside its place and renamed when complete.
 ///
 /// # Errors
-/// [`PtError::BadTensor`] before anything is written, [`PtError::Io`] if the disk refuses.
-pub fn write_dict(path: &Path, items: &[(&str, PtItem)]) -> Result<(), PtError> {
+/// [`FileError`]: before anything is written, of values that do not fill a shape; if the disk refuses.
+pub fn write_dict(path: &Path, items: &[(&str, PtItem)]) -> Result<(), FileError> {
     for (key, item) in items {
         if let PtItem::Tensor(tensor) = item {
-            let len = bytes_of(&tensor.values).1;
+            let len = tensor.values.len();
             if len != tensor.shape.iter().product::<usize>() {
-                let shape = tensor.shape.clone();
-                return Err(PtError::BadTensor { file: path.to_owned(), key: (*key).into(), len, shape });
+                let what = format!("key \"{key}\": {len} values do not fill shape {:?}", tensor.shape);
+                return Err(FileError::new(path, what, "give as many values as the shape has"));
             }
         }
     }
-    archive::write(path, |zip| fill(zip, items)).map_err(|source| PtError::Io {
-        file: path.to_owned(),
-        what: "cannot write the file",
-        source,
-    })
+    archive::write(path, |zip| fill(zip, items)).map_err(|err| FileError::io(path, "cannot write the file", err))
 }
 
 fn fill<W: Write + Seek>(zip: &mut ZipWriter<W>, items: &[(&str, PtItem)]) -> std::io::Result<()> {
@@ -62,7 +59,7 @@ fn fill<W: Write + Seek>(zip: &mut ZipWriter<W>, items: &[(&str, PtItem)]) -> st
     zip.write_all(b"little")?;
     for (number, tensor) in tensors(items).enumerate() {
         zip.start_file(format!("archive/data/{number}"), options)?;
-        zip.write_all(&bytes_of(&tensor.values).0)?;
+        zip.write_all(&tensor.values.bytes())?;
     }
     zip.start_file("archive/version", options)?;
     zip.write_all(b"3\n")
@@ -73,16 +70,6 @@ fn tensors<'a>(items: &'a [(&str, PtItem)]) -> impl Iterator<Item = &'a Tensor> 
         PtItem::Tensor(tensor) => Some(tensor),
         _ => None,
     })
-}
-
-/// Little-endian bytes and the number of values.
-fn bytes_of(values: &Values) -> (Vec<u8>, usize) {
-    match values {
-        Values::F32(v) => (v.iter().flat_map(|x| x.to_le_bytes()).collect(), v.len()),
-        Values::F64(v) => (v.iter().flat_map(|x| x.to_le_bytes()).collect(), v.len()),
-        Values::U8(v) => (v.clone(), v.len()),
-        Values::I64(v) => (v.iter().flat_map(|x| x.to_le_bytes()).collect(), v.len()),
-    }
 }
 
 /// The pickle of the dict. Opcodes: see `pickletools` of the Python library.
@@ -143,18 +130,18 @@ fn int_tuple(out: &mut Vec<u8>, values: &[usize]) {
 
 /// `torch._utils._rebuild_tensor_v2(storage, 0, shape, stride, False, OrderedDict())`.
 fn tensor(out: &mut Vec<u8>, tensor: &Tensor, storage: usize) {
-    let (class, len) = match &tensor.values {
-        Values::F32(v) => ("FloatStorage", v.len()),
-        Values::F64(v) => ("DoubleStorage", v.len()),
-        Values::U8(v) => ("ByteStorage", v.len()),
-        Values::I64(v) => ("LongStorage", v.len()),
+    let class = match &tensor.values {
+        Values::F32(_) => "FloatStorage",
+        Values::F64(_) => "DoubleStorage",
+        Values::U8(_) => "ByteStorage",
+        Values::I64(_) => "LongStorage",
     };
     out.extend(b"ctorch._utils\n_rebuild_tensor_v2\n(("); // GLOBAL, MARK (arguments), MARK (storage)
     text(out, "storage");
     out.extend(format!("ctorch\n{class}\n").bytes());
     text(out, &storage.to_string());
     text(out, "cpu");
-    int(out, len);
+    int(out, tensor.values.len());
     out.extend(b"tQ"); // TUPLE, BINPERSID
     int(out, 0);
     int_tuple(out, &tensor.shape);

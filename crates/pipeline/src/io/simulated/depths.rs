@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use super::{WriteError, check_name, make_parent};
+use super::{check_name, make_parent};
+use crate::io::error::FileError;
 use crate::io::pt::{Tensor, write_dict};
 use touch2touch_core::catalog::ToolSpec;
 use touch2touch_core::grid::RgbGrid;
@@ -50,8 +51,8 @@ fn planes(out: &mut Vec<u8>, picture: &RgbGrid) {
 /// Writes the touches of a tool. An existing file is replaced.
 ///
 /// # Errors
-/// [`WriteError`].
-pub fn write_depths(root: &Path, tool: &str, touches: Depths) -> Result<(), WriteError> {
+/// [`FileError`].
+pub fn write_depths(root: &Path, tool: &str, touches: Depths) -> Result<(), FileError> {
     check_name(tool)?;
     let path = root.join(format!("{tool}.pt"));
     make_parent(&path)?;
@@ -63,5 +64,5 @@ pub fn write_depths(root: &Path, tool: &str, touches: Depths) -> Result<(), Writ
         ("in_hand_pose", Tensor::f32(&[n, 3], touches.poses).into()),
         ("grasp_widths", Tensor::f32(&[n], touches.widths_mm).into()),
     ];
-    Ok(write_dict(&path, &items)?)
+    write_dict(&path, &items)
 }

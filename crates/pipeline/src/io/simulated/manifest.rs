@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::{Layout, WriteError, make_parent, write_models, write_pair, write_split};
+use super::{Layout, make_parent, write_models, write_pair, write_split};
+use crate::io::error::FileError;
 use crate::io::{atomic, files};
 use touch2touch_core::dataset::Problem;
 use touch2touch_core::mesh::TriMesh;
@@ -53,28 +54,27 @@ impl Writing {
     /// lie beside.
     ///
     /// # Errors
-    /// [`WriteError::NotOurs`] if the folder holds anything else, which is then unchanged.
+    /// [`FileError`] if the folder holds anything else, which is then unchanged.
     pub fn begin(
         root: &Path,
         layout: Layout,
         tools: &[(&str, bool, TriMesh)],
         pairs: usize,
         recipe: Value,
-    ) -> Result<Self, WriteError> {
+    ) -> Result<Self, FileError> {
         let names: Vec<String> = tools.iter().map(|tool| tool.0.to_owned()).collect();
-        let key = layout.key();
+        let key: &str = layout.into();
         let mut manifest = match read(root) {
             None => {
                 if let Some(found) = first_entry(root)? {
-                    return Err(WriteError::NotOurs { folder: root.to_owned(), found });
+                    return Err(not_ours(root, &found));
                 }
                 Manifest { format: FORMAT.into(), version: VERSION, tools: names, parts: BTreeMap::new() }
             }
             Some(manifest) => {
                 let same = manifest.parts.get(key).is_none_or(|part| part.recipe == recipe && part.pairs == pairs);
                 if !same || manifest.tools != names {
-                    let found = "a simulated data set of other tools, grasps or seeds".to_owned();
-                    return Err(WriteError::NotOurs { folder: root.to_owned(), found });
+                    return Err(not_ours(root, "a simulated data set of other tools, grasps or seeds"));
                 }
                 manifest
             }
@@ -91,40 +91,32 @@ impl Writing {
     ///
     /// # Errors
     /// As there.
-    pub fn pair(&self, tool: &str, index: u64, sample: &Sample) -> Result<(), WriteError> {
+    pub fn pair(&self, tool: &str, index: u64, sample: &Sample) -> Result<(), FileError> {
         write_pair(&self.root, self.layout, tool, index, sample).map(drop)
     }
 
     /// Says that all pairs are there.
     ///
     /// # Errors
-    /// [`WriteError`].
-    pub fn finish(mut self) -> Result<(), WriteError> {
+    /// [`FileError`].
+    pub fn finish(mut self) -> Result<(), FileError> {
         write_split(&self.root, self.tools.iter().map(|(name, seen)| (name.as_str(), *seen)))?;
-        if let Some(part) = self.manifest.parts.get_mut(self.layout.key()) {
+        if let Some(part) = self.manifest.parts.get_mut::<str>(self.layout.into()) {
             part.finished = true;
         }
         self.write()
     }
 
-    fn write(&self) -> Result<(), WriteError> {
+    fn write(&self) -> Result<(), FileError> {
         let file = self.root.join(MANIFEST);
         make_parent(&file)?;
-        let failed = |source| WriteError::Manifest { file: file.clone(), source };
-        let text = serde_json::to_vec_pretty(&self.manifest).map_err(|err| failed(err.into()))?;
-        atomic::write_bytes(&file, &text).map_err(failed)
+        atomic::write_json(&file, "cannot write the manifest", &self.manifest)
     }
 }
 
-impl Layout {
-    fn key(self) -> &'static str {
-        match self {
-            Self::Train => "train",
-            Self::Test => "test",
-            Self::TrainOnly => "train_only",
-            Self::GelslimDepth => "gelslim_depth",
-        }
-    }
+fn not_ours(root: &Path, found: &str) -> FileError {
+    let what = format!("the folder holds {found}, which was not written by the same command");
+    FileError::new(root, format!("{what}; choose a new folder"), "choose a new folder")
 }
 
 /// The manifest in `root`; `None` if there is none that this program understands.
@@ -137,8 +129,8 @@ fn read(root: &Path) -> Option<Manifest> {
 }
 
 /// Something that lies in the folder, if it is there and not empty. Hidden files do not count.
-fn first_entry(root: &Path) -> Result<Option<String>, WriteError> {
-    let failed = |source| WriteError::Folder { folder: root.to_owned(), source };
+fn first_entry(root: &Path) -> Result<Option<String>, FileError> {
+    let failed = |err| FileError::io(root, "cannot list the folder", err);
     let entries = match std::fs::read_dir(root) {
         Ok(entries) => entries,
         Err(err) if err.kind() == std::io::ErrorKind::NotFound => return Ok(None),

@@ -106,7 +106,7 @@ pub(super) fn gather(
         let sample = match dataset.load(id) {
             Ok(sample) => sample,
             Err(err) => {
-                skip(format!("{err} ({})", err.hint()));
+                skip(format!("{err} ({})", err.hint));
                 continue;
             }
         };

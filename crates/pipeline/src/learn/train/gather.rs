@@ -99,7 +99,7 @@ pub(super) fn gather(
             let sample = match sample {
                 Ok(sample) => sample,
                 Err(err) => {
-                    gathered.unusable.push(refused(format!("{err} ({})", err.hint())));
+                    gathered.unusable.push(refused(format!("{err} ({})", err.hint)));
                     continue;
                 }
             };

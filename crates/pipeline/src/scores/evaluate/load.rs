@@ -118,7 +118,7 @@ fn load(dataset: &Dataset, labels: &Labeled, id: PairId) -> Result<LoadedPair, S
         return Err(Skipped { what: format!("pair {}", id.0), method: String::new(), why: "no such pair".into() });
     };
     let skip = |why: String| Skipped { what: entry.name.clone(), method: String::new(), why };
-    let fail = |err: crate::io::dataset::LoadError| skip(format!("{err} ({})", err.hint()));
+    let fail = |err: crate::io::error::FileError| skip(format!("{err} ({})", err.hint));
     let sample = dataset.load(id).map_err(fail)?;
     if sample.pads.iter().flatten().all(|t| t.color().is_none() || t.depth().is_none()) {
         return Err(skip("no finger has both a GelSlim image and a measured imprint".into()));

@@ -93,17 +93,14 @@ impl Recipe {
             words = words.then(shift_words(self.shift));
         }
         if stage >= Stage::Mask {
-            words = words.then(self.mask_words());
+            let model = self.mask_model.as_ref().map(|model| model.origin.path().display().to_string());
+            words =
+                words.option("--mask", self.mask).option_if("--mask-bundle", model).word_if(!self.hand, "--no-hand");
         }
         if stage >= Stage::Pose {
             words = words.option("--engine", self.registration);
         }
         words.runtime(self.engine)
-    }
-
-    fn mask_words(&self) -> Words {
-        let model = self.mask_model.as_ref().map(|model| model.origin.path().display().to_string());
-        Words::default().option("--mask", self.mask).option_if("--mask-bundle", model).word_if(!self.hand, "--no-hand")
     }
 }
 
@@ -113,7 +110,11 @@ pub(crate) fn shift_words(shift: ShiftMode) -> Words {
         ShiftMode::Raw => "raw".to_owned(),
         ShiftMode::PaperShift => "paper".to_owned(),
         ShiftMode::ExactInverse => "exact".to_owned(),
-        ShiftMode::Parts(parts) => format!("exact:{}", parts_text(parts)),
+        ShiftMode::Parts(CorrectionParts::NONE) => "exact:none".to_owned(),
+        ShiftMode::Parts(parts) => {
+            let names: Vec<&str> = Vec::<CorrectionPart>::from(parts).into_iter().map(Into::into).collect();
+            format!("exact:{}", names.join(","))
+        }
         // `stats --out statistics.json` writes it.
         ShiftMode::Refit(_) => "refit:statistics.json".to_owned(),
     };
@@ -214,11 +215,6 @@ pub fn millimeters(length_m: f32) -> String {
 /// A length in meters of one in millimeters.
 pub fn meters(length_mm: f64) -> f32 {
     (length_mm / 1e3) as f32
-}
-
-fn parts_text(parts: CorrectionParts) -> String {
-    let names: Vec<&'static str> = Vec::<CorrectionPart>::from(parts).into_iter().map(Into::into).collect();
-    if names.is_empty() { "none".into() } else { names.join(",") }
 }
 
 #[cfg(test)]

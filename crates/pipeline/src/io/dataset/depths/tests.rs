@@ -10,6 +10,7 @@ use crate::steps::recipe::{Recipe, Stage};
 use crate::steps::tool::load_tool;
 use touch2touch_core::catalog::{self, ToolSpec};
 use touch2touch_core::contact::signed_distances;
+use touch2touch_core::dataset::PairId;
 use touch2touch_core::sim::{self, Grasp, SimConfig};
 
 fn tool() -> &'static ToolSpec {

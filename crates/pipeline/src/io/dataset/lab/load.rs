@@ -4,11 +4,12 @@ use std::path::Path;
 
 use glam::DAffine3;
 
-use crate::io::dataset::{InvalidPixels, LoadError, Loaded, most_invalid, plausible, problem};
-use crate::io::pt::{PtDict, PtError, read_dict};
+use crate::io::dataset::{InvalidPixels, Loaded, colors, most_invalid, plausible, problem};
+use crate::io::error::{FileError, FileErrorKind};
+use crate::io::pt::{PtDict, read_dict};
 use touch2touch_core::dataset::Problem;
 use touch2touch_core::frames::{PlanarPose, affine_from_xyz_quat};
-use touch2touch_core::grid::{DepthMap, Grid, RgbGrid};
+use touch2touch_core::grid::{DepthMap, Grid};
 use touch2touch_core::rig::{PadId, Rig, lab};
 use touch2touch_core::sample::{ColorTouch, DepthCamera, DepthTouch, DepthTruth, PadTouch, Sample};
 use touch2touch_core::sensor::Intrinsics;
@@ -23,7 +24,7 @@ const NO_DEPTH_M: f32 = 1e-4;
 const SAME_POSE: f64 = 1e-5;
 
 /// Loads one pair; either half may be absent.
-pub(super) fn pair(gelslim_file: Option<&Path>, bubble_file: Option<&Path>) -> Result<Loaded, LoadError> {
+pub(super) fn pair(gelslim_file: Option<&Path>, bubble_file: Option<&Path>) -> Result<Loaded, FileError> {
     let mut notes = Vec::new();
     let mut invalid = [InvalidPixels::default(); 2];
     let mut fingers = [PadTouch::default(), PadTouch::default()];
@@ -64,22 +65,22 @@ pub(super) fn pair(gelslim_file: Option<&Path>, bubble_file: Option<&Path>) -> R
 /// A value that the sample can do without: absent, or no tensor, is a note; wrong is an error.
 fn optional<T>(
     dict: &PtDict,
-    result: Result<T, PtError>,
+    result: Result<T, FileError>,
     without: &str,
     notes: &mut Vec<Problem>,
-) -> Result<Option<T>, PtError> {
+) -> Result<Option<T>, FileError> {
     match result {
         Ok(value) => Ok(Some(value)),
         // What another program stored in its own way costs no more than itself.
-        Err(err @ (PtError::MissingKey { .. } | PtError::NotATensor { .. })) => {
-            notes.push(problem(dict.file(), format!("{err}: {without}"), err.hint()));
+        Err(err) if err.kind == FileErrorKind::Missing => {
+            notes.push(problem(dict.file(), format!("{err}: {without}"), err.hint));
             Ok(None)
         }
         Err(err) => Err(err),
     }
 }
 
-fn pose(dict: &PtDict, notes: &mut Vec<Problem>) -> Result<Option<[f64; 3]>, PtError> {
+fn pose(dict: &PtDict, notes: &mut Vec<Problem>) -> Result<Option<[f64; 3]>, FileError> {
     let without = "this file says no true pose";
     let mut values = [0.0; 3];
     for (value, key) in values.iter_mut().zip(["theta", "x", "y"]) {
@@ -123,7 +124,7 @@ fn bubble_touches(
     dict: &PtDict,
     notes: &mut Vec<Problem>,
     invalid: &mut [InvalidPixels; 2],
-) -> Result<[DepthTouch; 2], LoadError> {
+) -> Result<[DepthTouch; 2], FileError> {
     let imprint = dict.f32s("bubble_imprint", &[&BUBBLE_SHAPE])?;
     let without = "points cannot be lifted to the grasp frame";
     let reference = optional(dict, dict.f32s("bubble_depth_ref", &[&BUBBLE_SHAPE]), without, notes)?;
@@ -134,7 +135,7 @@ fn bubble_touches(
     } else {
         None
     };
-    let mut touch = |finger: PadId| -> Result<DepthTouch, LoadError> {
+    let mut touch = |finger: PadId| -> Result<DepthTouch, FileError> {
         let index = finger.index();
         let mut map = depth_map(halves(&imprint)[index]);
         let reference = reference.as_ref().map(|r| depth_map(halves(r)[index]));
@@ -193,7 +194,7 @@ type Camera = (Intrinsics, DAffine3);
 /// Intrinsics and camera-to-grasp transform of each finger, where the file has them and they make sense.
 ///
 /// Source: `ICP_dataset_cal.py` lines 222-240 and 443-463: both poses are given in the arm's base frame.
-fn cameras(dict: &PtDict, without: &str, notes: &mut Vec<Problem>) -> Result<[Option<Camera>; 2], PtError> {
+fn cameras(dict: &PtDict, without: &str, notes: &mut Vec<Problem>) -> Result<[Option<Camera>; 2], FileError> {
     let k = optional(dict, dict.f64s("K", &[&[2, 3, 3], &[2, 1, 3, 3]]), without, notes)?;
     let bubbles = optional(dict, dict.f64s("bubbles_tr_quat", &[&[2, 1, 7], &[2, 7]]), without, notes)?;
     let grasp = optional(dict, dict.f64s("grasp_frame_quat", &[&[1, 7], &[7], &[1, 1, 7]]), without, notes)?;
@@ -258,39 +259,8 @@ fn not_unit(dict: &PtDict, key: &str, length: f64, how: &str) -> Problem {
     problem(dict.file(), what, "expected x y z qx qy qz qw of a rotation; check how the frames were converted")
 }
 
-fn gelslim_touches(dict: &PtDict, notes: &mut Vec<Problem>) -> Result<[ColorTouch; 2], LoadError> {
-    let mut raw = dict.f32s("gelslim", &[&GELSLIM_SHAPE])?;
-    let mut reference = dict.f32s("gelslim_ref", &[&GELSLIM_SHAPE])?;
-    let half = raw.len() / 2;
-    let mut bad = 0usize;
-    let fingers = raw.chunks_exact_mut(half).zip(reference.chunks_exact_mut(half));
-    for ((raw, reference), finger) in fingers.zip(lab::PADS) {
-        let before = bad;
-        for (a, b) in raw.iter_mut().zip(reference) {
-            if !(a.is_finite() && b.is_finite()) {
-                bad += 1;
-                (*a, *b) = (0.0, 0.0);
-            }
-        }
-        most_invalid(dict.file(), bad - before, half, || {
-            format!("values of the {} GelSlim image", Rig::lab().pad_key(finger))
-        })?;
-    }
-    if bad > 0 {
-        let percent = 100.0 * bad as f64 / raw.len() as f64;
-        let what = format!("keys \"gelslim\", \"gelslim_ref\": {bad} values ({percent:.2} %) are NaN or infinite");
-        notes.push(problem(dict.file(), what, "these values count as no difference"));
-    }
-    let picture = |values: &[f32]| -> RgbGrid {
-        let plane = lab::GELSLIM.width * lab::GELSLIM.height;
-        Grid::from_fn(lab::GELSLIM.width, lab::GELSLIM.height, |x, y| {
-            let at = y * lab::GELSLIM.width + x;
-            [values[at], values[plane + at], values[2 * plane + at]]
-        })
-    };
-    let touch = |i: usize| {
-        ColorTouch::from_images(picture(halves(&raw)[i]), picture(halves(&reference)[i]))
-            .expect("both have the checked shape")
-    };
-    Ok([touch(0), touch(1)])
+fn gelslim_touches(dict: &PtDict, notes: &mut Vec<Problem>) -> Result<[ColorTouch; 2], FileError> {
+    let keys = ["gelslim", "gelslim_ref"];
+    let [raw, reference] = keys.map(|key| dict.f32s(key, &[&GELSLIM_SHAPE]));
+    colors::touches(dict.file(), keys, [raw?, reference?], [0, 1], notes)
 }

@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
-use super::super::{LoadError, problem};
+use super::super::problem;
 use super::{ASSUMED_IMPRINT_RANGE_M, NotedTile};
-use crate::io::images::PictureError;
+use crate::io::error::FileError;
+use crate::io::images::wrong_kind;
 use touch2touch_core::grid::Grid;
 
 /// Values of a picture that was stretched differ by at least half of what 16 bits hold.
@@ -26,22 +27,20 @@ struct Unit {
 /// The levels (0..255, as in a stretched picture) of a picture of 16 bits, and what to say of it.
 ///
 /// # Errors
-/// [`PictureError::Kind`] where the values are lengths of which the unit is not known.
-pub(super) fn levels(path: &Path, picture: &Grid<u16>) -> Result<NotedTile, LoadError> {
+/// [`FileError`] where the values are lengths of which the unit is not known.
+pub(super) fn levels(path: &Path, picture: &Grid<u16>) -> Result<NotedTile, FileError> {
     let [lo, hi] = ends(picture.as_slice().iter().copied());
     if hi - lo >= STRETCHED || hi == lo {
         return Ok((picture.map(|&v| f32::from(v) / 257.0), None));
     }
     let Some(unit) = unit(picture) else {
         let [nearest, _] = ends(picture.as_slice().iter().copied().filter(|&v| v > 0));
-        return Err(LoadError::from(PictureError::Kind {
-            file: path.to_owned(),
-            found: format!(
-                "16-bit gray with values from {nearest} to {hi}, the whole depth of a camera or of a unit that is not known"
-            ),
-            expected: "how far the membrane is pushed in: 0 to 255, 16 bits over their whole range, or millimeters, tenths of \
-                       a millimeter or micrometers with 0 where nothing is pushed in",
-        }));
+        let found = format!(
+            "16-bit gray with values from {nearest} to {hi}, the whole depth of a camera or of a unit that is not known"
+        );
+        let expected = "how far the membrane is pushed in: 0 to 255, 16 bits over their whole range, or millimeters, tenths of \
+                        a millimeter or micrometers with 0 where nothing is pushed in";
+        return Err(wrong_kind(path, found, expected));
     };
     let [from, to] = ASSUMED_IMPRINT_RANGE_M;
     let meters = |v: u16| unit.zero_m + unit.step_m * f64::from(v);

@@ -2,10 +2,11 @@
 
 use std::path::Path;
 
-use super::super::{LoadError, most_invalid};
+use super::super::most_invalid;
 use super::{NotedTile, lengths};
-use crate::io::images::{self, PictureError};
-use crate::io::npz::{NpzError, read_npy};
+use crate::io::error::FileError;
+use crate::io::images::{self, wrong_kind};
+use crate::io::npz::read_npy;
 use crate::io::pt::{Tensor, Values};
 use crate::io::tiff::{self, Gray};
 use touch2touch_core::grid::{DepthMap, Grid};
@@ -32,15 +33,11 @@ pub(super) enum Depth {
 }
 
 /// Reads a file of depths, which a sensor's camera took.
-pub(super) fn read(path: &Path, sensor: &Sensor) -> Result<Depth, LoadError> {
-    let kind = |found: String| LoadError::from(PictureError::Kind { file: path.to_owned(), found, expected: EXPECTED });
+pub(super) fn read(path: &Path, sensor: &Sensor) -> Result<Depth, FileError> {
+    let kind = |found: String| wrong_kind(path, found, EXPECTED);
     let lower = path.to_string_lossy().to_ascii_lowercase();
     let meters = if lower.ends_with(".npy") {
-        let tensor = read_npy(path).map_err(|err| match err {
-            NpzError::Io { file, source } => LoadError::from(PictureError::Io { file, source }),
-            NpzError::Archive { reason, .. } | NpzError::Array { reason, .. } => kind(reason),
-        })?;
-        array(tensor).map_err(kind)?
+        array(read_npy(path)?).map_err(kind)?
     } else if lower.ends_with(".tif") || lower.ends_with(".tiff") {
         match tiff::read(path)? {
             Gray::Float(meters) => meters,
