@@ -270,8 +270,6 @@ macro_rules! actions {
             _ => does(prefer(|s| s.compare_mut().mode = next_of(&s.compare_mut().mode)));
         SwapCompared, View, "Swap A and B", "Swaps A and B in Compare", [shift(K::R)],
             _ => does(prefer(|s| *s.compare_mut() = s.compare_mut().clone().swapped()));
-        WindowOnly, View, "GelSlim window only", "Draws in 3D only what the GelSlims see", [plain(K::W)],
-            _ => does(prefer(|s| s.scene.only_window ^= true));
         Parallel, View, "Parallel projection", "No perspective in 3D", [plain(K::I)],
             _ => does(prefer(|s| s.scene.orthographic ^= true));
         Footprint, View, "GelSlim window", "Outlines what the GelSlim sees, on bubble images", [],

@@ -72,8 +72,6 @@ pub struct MeshStyle {
     pub map: ColorMap,
     /// For [`MeshItem::values`].
     pub range: Range,
-    /// True where the surface has an inside: what a plane lays open is then filled.
-    pub closed: bool,
 }
 
 impl Default for MeshStyle {
@@ -86,7 +84,6 @@ impl Default for MeshStyle {
             edges: None,
             map: ColorMap::Diverging,
             range: Range { lo: 0.0, hi: 1.0 },
-            closed: true,
         }
     }
 }
@@ -102,7 +99,6 @@ pub(super) struct MeshUniform {
     pub(super) lo: f32,
     pub(super) hi: f32,
     pub(super) map: u32,
-    pub(super) closed: u32,
 }
 
 /// A mesh on the device.
@@ -143,7 +139,6 @@ impl MeshData {
                 lo: range.lo,
                 hi: range.hi,
                 map: style.map as u32,
-                closed: u32::from(style.closed),
             },
         );
         let mut did = [uploaded, written];

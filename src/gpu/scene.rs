@@ -15,7 +15,7 @@ use super::mesh::{Look, MeshData, MeshItem};
 use super::pipelines::Pipelines;
 use super::points::{CloudItem, PointsData};
 use super::target::{Pass, Target};
-use super::view::{self, Camera, Part, Plane, ViewUniform};
+use super::view::{self, Camera, Part, ViewUniform};
 use super::{Gpu, GpuError, wgpu};
 
 /// Everything that one view shows. Cheap to make anew for every frame: the geometry is shared.
@@ -29,10 +29,6 @@ pub struct SceneData {
     pub meshes: Vec<MeshItem>,
     /// Lines, with different names.
     pub lines: Vec<LinesItem>,
-    /// Planes that cut meshes and points; only [`MAX_PLANES`] do.
-    ///
-    /// [`MAX_PLANES`]: super::view::MAX_PLANES
-    pub cut: Vec<Plane>,
     /// The floor, with the shadow of solid meshes.
     pub floor: Option<Floor>,
     /// True where the background is left out: what nothing covers has no opacity.
@@ -52,7 +48,6 @@ impl Default for SceneData {
             clouds: vec![],
             meshes: vec![],
             lines: vec![],
-            cut: vec![],
             floor: None,
             transparent: false,
             unit_px: 1.0,
@@ -238,7 +233,7 @@ impl SceneRenderer {
     /// Sends what changed; returns whether anything did.
     fn update(&mut self, gpu: &Gpu, scene: &SceneData, camera: &Camera, part: Part) -> Result<bool, GpuError> {
         let mut done = Counters {
-            uniforms: u64::from(self.view.set(gpu, camera.uniform(part, &scene.cut, scene.unit_px))),
+            uniforms: u64::from(self.view.set(gpu, camera.uniform(part, scene.unit_px))),
             ..Counters::default()
         };
         let mut count = |[uploaded, written]: [bool; 2]| {

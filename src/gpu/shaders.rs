@@ -78,10 +78,8 @@ mod tests {
                 up_in_world,
                 key_in_world,
                 depth,
-                planes,
                 size_px,
                 px_per_m,
-                plane_count,
                 unit_px,
             }
         );
@@ -92,7 +90,6 @@ mod tests {
             points::PointsUniform {
                 world_from_points,
                 color,
-                highlight,
                 lo,
                 hi,
                 size,
@@ -100,11 +97,9 @@ mod tests {
                 color_mode,
                 map,
                 stride,
-                drawn,
-                selected,
             }
         );
-        check_layout!(MESH, mesh::MeshUniform { world_from_mesh, color, xray, scalar, lo, hi, map, closed });
+        check_layout!(MESH, mesh::MeshUniform { world_from_mesh, color, xray, scalar, lo, hi, map });
         check_layout!(EDGES, edges::EdgeVertex { a, always, b, unused, normal_a, normal_b });
         check_layout!(EDGES, edges::EdgesUniform { world_from_mesh, color, width_px, creases, dash_px });
         check_layout!(LINES, lines::LineVertex { position, color });

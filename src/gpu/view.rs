@@ -77,33 +77,10 @@ impl Ray {
     }
 }
 
-/// Planes that can cut at a time.
-pub(crate) const MAX_PLANES: usize = 8;
 /// Nearest distance from the eye that is drawn, as a share of the distance to the target.
 const NEAR: f64 = 0.02;
 /// Depths of a parallel projection: so many distances to both sides of the target.
 const ORTHOGRAPHIC_REACH: f64 = 40.0;
-
-/// A plane that cuts a scene: what has `normal · p + offset_m < 0` is not drawn.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Plane {
-    /// Unit vector towards what stays, world.
-    pub normal: DVec3,
-    /// Meters.
-    pub offset_m: f64,
-}
-
-impl Plane {
-    /// The plane through a point (meters, world) that keeps the side of `normal`.
-    pub fn through(point: DVec3, normal: DVec3) -> Self {
-        Self { normal, offset_m: -normal.dot(point) }
-    }
-
-    /// Meters that a point lies on the side that stays.
-    pub fn height(&self, p: DVec3) -> f64 {
-        self.normal.dot(p) + self.offset_m
-    }
-}
 
 /// A rectangle of a picture: pictures larger than a texture are drawn in several.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -309,14 +286,13 @@ impl Camera {
         (back + 0.55 * up - 0.45 * right).normalize()
     }
 
-    /// The picture of `size` pixels, cut open by planes, as what a mask is drawn on.
-    pub fn sight(&self, size: [u32; 2], layers: Layers, cut: &[Plane]) -> Sight {
-        let cut = cut.iter().take(MAX_PLANES).map(|plane| plane.normal.extend(plane.offset_m).as_vec4()).collect();
-        Sight { clip_from_grasp: self.clip_from_world(size).as_mat4(), size_px: size, layers, cut }
+    /// The picture of `size` pixels, as what a mask is drawn on.
+    pub fn sight(&self, size: [u32; 2], layers: Layers) -> Sight {
+        Sight { clip_from_grasp: self.clip_from_world(size).as_mat4(), size_px: size, layers }
     }
 
-    /// The camera for the device, with the first [`MAX_PLANES`] planes that cut; `unit_px` pixels are one of a screen.
-    pub(super) fn uniform(&self, part: Part, cut: &[Plane], unit_px: f32) -> ViewUniform {
+    /// The camera for the device; `unit_px` pixels are one of a screen.
+    pub(super) fn uniform(&self, part: Part, unit_px: f32) -> ViewUniform {
         let size = part.of;
         let [_, up, back] = self.axes();
         let eye = if self.orthographic { back.extend(0.0) } else { self.eye().extend(1.0) };
@@ -335,11 +311,7 @@ impl Camera {
             depth: depth.map(|v| v as f32),
             size_px: part.size.map(|s| s.max(1) as f32),
             px_per_m: (self.px_per_m(size) * at_one) as f32,
-            plane_count: cut.len().min(MAX_PLANES) as u32,
             unit_px: if unit_px.is_finite() { unit_px.max(0.01) } else { 1.0 },
-            planes: std::array::from_fn(|i| {
-                cut.get(i).map_or([0.0; 4], |plane| plane.normal.extend(plane.offset_m).as_vec4().to_array())
-            }),
         }
     }
 }
@@ -390,10 +362,8 @@ pub(super) struct ViewUniform {
     pub(super) up_in_world: [f32; 4],
     pub(super) key_in_world: [f32; 4],
     pub(super) depth: [f32; 4],
-    pub(super) planes: [[f32; 4]; MAX_PLANES],
     pub(super) size_px: [f32; 2],
     pub(super) px_per_m: f32,
-    pub(super) plane_count: u32,
     pub(super) unit_px: f32,
 }
 
@@ -443,7 +413,7 @@ mod tests {
     #[test]
     fn a_sight_shows_points_where_the_camera_does() {
         for camera in cameras() {
-            let sight = camera.sight(SIZE, Layers::Front, &[]);
+            let sight = camera.sight(SIZE, Layers::Front);
             for p in [DVec3::new(0.02, 0.01, 0.0), DVec3::new(-0.01, -0.03, 0.05), camera.target] {
                 let (px, _) = camera.project(p, SIZE).unwrap();
                 // There the middle of the first pixel is 0.5, here 0.

@@ -38,7 +38,7 @@ pub fn membrane(finger: &str, (revision, mesh): (u64, Arc<TriMesh>), color: [f32
         mesh,
         shading: Shading::Round,
         values: Arc::default(),
-        style: MeshStyle { color, opacity, look: Look::Veil, closed: false, ..MeshStyle::default() },
+        style: MeshStyle { color, opacity, look: Look::Veil, ..MeshStyle::default() },
     }
 }
 

@@ -11,7 +11,6 @@ mod pick;
 mod steps;
 mod strip;
 mod verdict;
-mod window;
 
 use eframe::egui::{self, Button, Color32, Rect, RichText, Ui, UiBuilder, vec2};
 use glam::{DAffine3, DVec3};
@@ -152,13 +151,6 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
     ui.scope_builder(UiBuilder::new().max_rect(head.shrink2(vec2(4.0, 2.0))), |ui| {
         ui.horizontal_centered(|ui| choose_sides(cx, ui));
     });
-    // The window has a row of its own: in a narrow pane there is none to share.
-    let row = if cx.state.settings.scene.only_window { HEAD } else { 0.0 };
-    let (bar, area) = area.split_top_bottom_at_y((area.top() + row).min(area.bottom()));
-    if row > 0.0 {
-        let mut ui = ui.new_child(UiBuilder::new().max_rect(bar.shrink2(vec2(4.0, 2.0))).id_salt("window"));
-        window::bar(cx, &mut ui);
-    }
     let sides = sides_shown(cx.state);
     // The pose in hand stands below the pictures, not on them, and has the width of all.
     let in_hand = sides.iter().copied().find(|side| hands::strip_height(cx.state, *side) > 0.0);

@@ -427,7 +427,7 @@ draws! {
     labels: LabelsCommand {
         6 BeginStroke(finger(), source(), position(), any::<bool>()),
         4 BeginIn3d((finger(), source(), position(), point(), any::<bool>()).prop_map(|(finger, source, at_px, size_at, erase)| {
-            let sight = Sight { clip_from_grasp: Mat4::IDENTITY, size_px: [64, 48], layers: Layers::All, cut: Vec::new() };
+            let sight = Sight { clip_from_grasp: Mat4::IDENTITY, size_px: [64, 48], layers: Layers::All };
             Box::new(StrokeIn3d { finger, source, sight, at_px, size_at, erase })
         })),
         6 StrokeTo(position()),

@@ -38,15 +38,13 @@ pub struct SceneLook {
     pub hidden: BTreeSet<SceneLayer>,
     /// Parallel projection.
     pub orthographic: bool,
-    /// True where only what the GelSlims see is drawn.
-    pub only_window: bool,
     /// The scale of distances reaches as far to both sides, meters.
     pub distance_m: f32,
 }
 
 impl Default for SceneLook {
     fn default() -> Self {
-        Self { hidden: BTreeSet::new(), orthographic: false, only_window: false, distance_m: 0.001 }
+        Self { hidden: BTreeSet::new(), orthographic: false, distance_m: 0.001 }
     }
 }
 

@@ -14,7 +14,6 @@ use crate::gpu::edges::EdgeStyle;
 use crate::gpu::mesh::{Look, MeshItem, MeshStyle, Shading};
 use crate::gpu::points::{CloudItem, CloudStyle, PointColors, PointSize};
 use crate::gpu::scene::SceneData;
-use crate::gpu::view::Plane;
 use crate::spatial::items;
 use crate::ui::parts::cx::{Cx, side_color};
 use crate::ui::parts::theme::{self, CONTACT};
@@ -31,8 +30,6 @@ pub(super) struct SceneCloud {
     pub revision: u64,
     /// The contact points of each finger.
     pub fingers: PerPad<Arc<[DVec3]>>,
-    /// Window of the GelSlims on it: smallest and largest y and z, grasp frame.
-    pub window: Option<[DVec3; 2]>,
 }
 
 /// The membranes of a cloud as surfaces, made only while they are shown, and not again for another mask.
@@ -60,12 +57,7 @@ pub(super) fn update_cloud(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSour
         return;
     }
     memory.revision += 1;
-    *held = Some(SceneCloud {
-        key,
-        revision: memory.revision,
-        fingers: contact_points(clouds),
-        window: window(cx, clouds),
-    });
+    *held = Some(SceneCloud { key, revision: memory.revision, fingers: contact_points(clouds) });
 }
 
 /// The membranes as surfaces, made again only for other imprints.
@@ -96,23 +88,6 @@ fn contact_points(clouds: &Clouds) -> PerPad<Arc<[DVec3]>> {
         f.points.iter().zip(&f.contact).filter(|(_, contact)| **contact).map(|(point, _)| *point).collect()
     };
     clouds.fingers.as_ref().map(|cloud| cloud.map(contact))
-}
-
-/// The box around the points that the color sensors see; x is left open.
-fn window(cx: &Cx<'_>, clouds: &Clouds) -> Option<[DVec3; 2]> {
-    let rig = cx.state.rig();
-    let size = rig.depth()?.size();
-    let mut bounds: Option<[DVec3; 2]> = None;
-    for (pad, cloud) in clouds.fingers.entries() {
-        let Some(seen) = rig.seen_mask(pad, size) else { continue };
-        for (p, pixel) in cloud.points.iter().zip(&cloud.pixels).filter(|(p, _)| p.is_finite()) {
-            if seen.get(pixel[0].into(), pixel[1].into()) == Some(&true) {
-                let [lo, hi] = bounds.unwrap_or([*p, *p]);
-                bounds = Some([lo.min(*p), hi.max(*p)]);
-            }
-        }
-    }
-    bounds
 }
 
 /// Makes the CAD model for the renderer, where it is another one.
@@ -149,7 +124,6 @@ pub(super) fn color(cx: &Cx<'_>, source: ImprintSource, layer: SceneLayer) -> Co
 /// Everything one side shows.
 pub(super) fn scene_of(cx: &Cx<'_>, memory: &Memory, source: ImprintSource) -> SceneData {
     let mut scene = SceneData { background: rgb(cx.p.canvas), eye_dome: true, ..SceneData::default() };
-    scene.cut = cut(cx, memory, source);
     clouds(cx, memory, source, &mut scene);
     surfaces(cx, memory, source, &mut scene);
     pointed(cx, source, &mut scene);
@@ -160,18 +134,6 @@ pub(super) fn scene_of(cx: &Cx<'_>, memory: &Memory, source: ImprintSource) -> S
         guides(cx, &mut scene);
     }
     scene
-}
-
-/// The planes that cut a view open.
-pub(super) fn cut(cx: &Cx<'_>, memory: &Memory, source: ImprintSource) -> Vec<Plane> {
-    let mut planes = Vec::new();
-    let window = memory.clouds[source as usize].as_ref().and_then(|cloud| cloud.window);
-    if let Some([lo, hi]) = window.filter(|_| cx.state.settings.scene.only_window) {
-        for axis in [DVec3::Y, DVec3::Z] {
-            planes.extend([Plane::through(lo, axis), Plane::through(hi, -axis)]);
-        }
-    }
-    planes
 }
 
 /// The contact points of one finger, in one color.
