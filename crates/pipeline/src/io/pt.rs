@@ -206,19 +206,16 @@ impl PtDict {
     /// # Errors
     /// [`PtError::MissingKey`], [`PtError::NotATensor`] (numpy values among them), [`PtError::BadStorage`].
     pub fn tensor(&self, key: &str) -> Result<Tensor, PtError> {
-        match self.items.get(key) {
-            Some(Item::Tensor(place)) => self.whole(key, place),
-            Some(Item::Float(x)) => Ok(Tensor::f64(&[], vec![*x])),
-            Some(Item::Int(x)) => Ok(Tensor { shape: vec![], values: Values::I64(vec![*x]) }),
-            Some(Item::Bool(x)) => Ok(Tensor::u8(&[], vec![u8::from(*x)])),
+        let Place { storage, dtype, offset, shape, strides } = match self.items.get(key) {
+            Some(Item::Tensor(place)) => place,
+            Some(Item::Float(x)) => return Ok(Tensor::f64(&[], vec![*x])),
+            Some(Item::Int(x)) => return Ok(Tensor { shape: vec![], values: Values::I64(vec![*x]) }),
+            Some(Item::Bool(x)) => return Ok(Tensor::u8(&[], vec![u8::from(*x)])),
             Some(Item::Other(found)) => {
-                Err(PtError::NotATensor { file: self.file.clone(), key: key.into(), found: clip(found) })
+                return Err(PtError::NotATensor { file: self.file.clone(), key: key.into(), found: clip(found) });
             }
-            None => Err(self.missing(key)),
-        }
-    }
-
-    fn whole(&self, key: &str, Place { storage, dtype, offset, shape, strides }: &Place) -> Result<Tensor, PtError> {
+            None => return Err(self.missing(key)),
+        };
         let bad = |reason: String| self.bad(key, reason);
         // A view can repeat one value of the file for ever.
         let values = product(shape);
