@@ -17,9 +17,10 @@ use touch2touch::gpu::points::{CloudItem, CloudStyle, PointColors, PointSize};
 use touch2touch::gpu::raster::Raster;
 use touch2touch::gpu::scene::{SceneData, SceneRenderer};
 use touch2touch::gpu::target::{Picture, Target};
-use touch2touch::gpu::view::{Camera, Preset};
+use touch2touch::gpu::view::{Camera, Part};
 use touch2touch::gpu::{Gpu, GpuError, guides, wgpu};
 use touch2touch_core::colormap::{ColorMap, Range};
+use touch2touch_core::frames::CameraPreset;
 use touch2touch_core::mesh::TriMesh;
 
 use crate::support;
@@ -49,7 +50,8 @@ impl View {
     }
 
     fn render(&mut self, scene: &SceneData) -> bool {
-        self.renderer.render(&self.gpu, scene, &self.camera, &self.target).unwrap()
+        let part = Part::whole(self.target.size());
+        self.renderer.render(&self.gpu, scene, (&self.camera, part), &self.target).unwrap()
     }
 
     fn picture(&mut self, scene: &SceneData) -> Picture {
@@ -110,7 +112,7 @@ fn inked(picture: &Picture) -> Vec<[u32; 2]> {
 fn a_point_appears_at_its_pixel_in_its_color_and_size() {
     let Some(mut view) = View::new() else { return };
     for orthographic in [false, true] {
-        for preset in [None, Some(Preset::Left), Some(Preset::Top)] {
+        for preset in [None, Some(CameraPreset::Left), Some(CameraPreset::Top)] {
             view.camera = Camera { orthographic, ..Camera::default() };
             if let Some(preset) = preset {
                 view.camera.look_from(preset);
@@ -197,12 +199,12 @@ fn grid_and_axes_are_where_they_belong() {
         let [x, y] = view.camera.project(p, SIZE).map(|(px, _)| [px.x as u32, px.y as u32]).unwrap();
         picture.rgb(x, y).unwrap()
     };
-    let x_axis = DVec3::X * 0.004;
-    view.renderer.render(&view.gpu, &scene, &view.camera, &view.target).unwrap();
+    let (x_axis, whole) = (DVec3::X * 0.004, Part::whole(SIZE));
+    view.renderer.render(&view.gpu, &scene, (&view.camera, whole), &view.target).unwrap();
     let [r, g, b] = at(&view.target.read(&view.gpu).unwrap(), x_axis);
     assert!(r == g && g == b && r < 80, "the black mesh and what it mirrors: {r} {g} {b}");
     scene.lines[1].style.overlay = true;
-    view.renderer.render(&view.gpu, &scene, &view.camera, &view.target).unwrap();
+    view.renderer.render(&view.gpu, &scene, (&view.camera, whole), &view.target).unwrap();
     assert_eq!(at(&view.target.read(&view.gpu).unwrap(), x_axis), [226, 88, 80]);
 }
 
@@ -210,7 +212,7 @@ fn grid_and_axes_are_where_they_belong() {
 fn the_color_maps_of_gpu_and_cpu_are_the_same() {
     let Some(mut view) = View::new() else { return };
     view.camera.orthographic = true;
-    view.camera.look_from(Preset::Front);
+    view.camera.look_from(CameraPreset::Front);
     let mut values: Vec<f32> = (0..=60).map(|i| -0.02 + 0.04 * i as f32 / 60.0).collect();
     values.extend([f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1.0, 1.0]);
     let place = |i: usize| {

@@ -46,33 +46,22 @@ pub enum PointSize {
     Meters(f32),
 }
 
-/// Style and pose of a cloud.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CloudStyle {
-    /// From the cloud's frame to the world (the grasp frame).
-    pub world_from_points: DAffine3,
-    /// sRGB, 0..1, for [`PointColors::One`].
-    pub color: [f32; 3],
-    /// For [`PointColors::Scalar`].
-    pub map: ColorMap,
-    /// For [`PointColors::Scalar`].
-    pub range: Range,
-    /// Diameter.
-    pub size: PointSize,
-    /// 0..1; below 1 nothing is hidden by the points.
-    pub opacity: f32,
-}
-
-impl Default for CloudStyle {
-    fn default() -> Self {
-        Self {
-            world_from_points: DAffine3::IDENTITY,
-            color: [0.2, 0.6, 1.0],
-            map: ColorMap::Viridis,
-            range: Range { lo: 0.0, hi: 1.0 },
-            size: PointSize::Px(3.0),
-            opacity: 1.0,
-        }
+with_defaults! {
+    /// Style and pose of a cloud.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct CloudStyle {
+        /// From the cloud's frame to the world (the grasp frame).
+        pub world_from_points: DAffine3 = DAffine3::IDENTITY,
+        /// sRGB, 0..1, for [`PointColors::One`].
+        pub color: [f32; 3] = [0.2, 0.6, 1.0],
+        /// For [`PointColors::Scalar`].
+        pub map: ColorMap = ColorMap::Viridis,
+        /// For [`PointColors::Scalar`].
+        pub range: Range = Range { lo: 0.0, hi: 1.0 },
+        /// Diameter.
+        pub size: PointSize = PointSize::Px(3.0),
+        /// 0..1; below 1 nothing is hidden by the points.
+        pub opacity: f32 = 1.0,
     }
 }
 

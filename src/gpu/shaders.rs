@@ -87,17 +87,7 @@ mod tests {
         check_layout!(POINTS, points::PointVertex { position, payload });
         check_layout!(
             POINTS,
-            points::PointsUniform {
-                world_from_points,
-                color,
-                lo,
-                hi,
-                size,
-                size_in_meters,
-                color_mode,
-                map,
-                stride,
-            }
+            points::PointsUniform { world_from_points, color, lo, hi, size, size_in_meters, color_mode, map, stride }
         );
         check_layout!(MESH, mesh::MeshUniform { world_from_mesh, color, xray, scalar, lo, hi, map });
         check_layout!(EDGES, edges::EdgeVertex { a, always, b, unused, normal_a, normal_b });

@@ -10,7 +10,6 @@ use crate::app::keys::{DatasetSeq, EstimateKey, ImprintKey, ImprintSource};
 use crate::app::results;
 use crate::app::settings::SceneLayer;
 use crate::app::workbench::Layer;
-use crate::gpu::edges::EdgeStyle;
 use crate::gpu::mesh::{Look, MeshItem, MeshStyle, Shading};
 use crate::gpu::points::{CloudItem, CloudStyle, PointColors, PointSize};
 use crate::gpu::scene::SceneData;
@@ -57,7 +56,11 @@ pub(super) fn update_cloud(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSour
         return;
     }
     memory.revision += 1;
-    *held = Some(SceneCloud { key, revision: memory.revision, fingers: contact_points(clouds) });
+    let contact = |f: &FingerCloud| {
+        f.points.iter().zip(&f.contact).filter(|(_, contact)| **contact).map(|(point, _)| *point).collect()
+    };
+    let fingers = clouds.fingers.as_ref().map(|cloud| cloud.map(contact));
+    *held = Some(SceneCloud { key, revision: memory.revision, fingers });
 }
 
 /// The membranes as surfaces, made again only for other imprints.
@@ -80,14 +83,6 @@ fn update_surface(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource, key: 
     }
     memory.revision += 1;
     *held = Some(SceneSurface { key, revision: memory.revision, fingers });
-}
-
-/// The contact points of each finger.
-fn contact_points(clouds: &Clouds) -> PerPad<Arc<[DVec3]>> {
-    let contact = |f: &FingerCloud| {
-        f.points.iter().zip(&f.contact).filter(|(_, contact)| **contact).map(|(point, _)| *point).collect()
-    };
-    clouds.fingers.as_ref().map(|cloud| cloud.map(contact))
 }
 
 /// Makes the CAD model for the renderer, where it is another one.
@@ -125,13 +120,30 @@ pub(super) fn color(cx: &Cx<'_>, source: ImprintSource, layer: SceneLayer) -> Co
 pub(super) fn scene_of(cx: &Cx<'_>, memory: &Memory, source: ImprintSource) -> SceneData {
     let mut scene = SceneData { background: rgb(cx.p.canvas), eye_dome: true, ..SceneData::default() };
     clouds(cx, memory, source, &mut scene);
-    surfaces(cx, memory, source, &mut scene);
-    pointed(cx, source, &mut scene);
-    picked(cx, source, &mut scene);
+    if let Some(held) = &memory.surfaces[source as usize] {
+        const OPACITY: f32 = 0.4;
+        let color = rgb(color(cx, source, SceneLayer::Membrane));
+        for (finger, mesh) in held.fingers.entries() {
+            let finger = cx.state.finger_name(finger);
+            scene.meshes.push(items::membrane(&finger, (held.revision, mesh.clone()), color, OPACITY));
+        }
+    }
+    // The pixel under the pointer and the one that was clicked are points of their own: they must not drown among the others.
+    let at = |finger, [x, y]: [usize; 2]| {
+        let cloud = results::cloud(cx.state, source).ready()?.finger(finger)?;
+        cloud.points.get(cloud.at_pixel(x, y)?).copied()
+    };
+    let pointed = cx.state.selection.hover.and_then(|h| at(h.finger, h.at_px.map(|v| v.round().max(0.0) as usize)));
+    scene.clouds.extend(pointed.map(|point| one_point("pointer", point, cx.p.strong, 9.0)));
+    let picked = cx.state.workbench.picked.filter(|picked| picked.source == source);
+    let picked = picked.and_then(|picked| at(picked.finger, picked.pixel.map(usize::from)));
+    scene.clouds.extend(picked.map(|point| one_point("picked", point, cx.p.accent, 11.0)));
     meshes(cx, memory, source, &mut scene);
     steps::add(cx, memory, source, &mut scene);
     if cx.state.settings.scene.shows(SceneLayer::Guides) {
-        guides(cx, &mut scene);
+        let (ground, ink) = (rgb(cx.p.canvas), rgb(cx.p.weak));
+        scene.floor = Some(items::floor(ground, ink));
+        scene.lines.extend(items::guides(ground, ink, u64::from(*cx.p == theme::DARK)));
     }
     scene
 }
@@ -139,7 +151,7 @@ pub(super) fn scene_of(cx: &Cx<'_>, memory: &Memory, source: ImprintSource) -> S
 /// The contact points of one finger, in one color.
 fn contact(finger: &str, revision: u64, points: &Arc<[DVec3]>, color: Color32) -> CloudItem {
     const DIAMETER_M: f32 = 0.000_35;
-    items::contact(finger, (revision, points.clone()), rgb(color), (PointSize::Meters(DIAMETER_M), 1.0))
+    items::contact(finger, (revision, points.clone()), rgb(color), PointSize::Meters(DIAMETER_M))
 }
 
 /// The contact points of both fingers, and those of the other side where both are shown in one view.
@@ -168,28 +180,6 @@ fn clouds(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, scene: &mut Scene
     }
 }
 
-/// The membranes as surfaces.
-fn surfaces(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, scene: &mut SceneData) {
-    const OPACITY: f32 = 0.4;
-    let Some(held) = &memory.surfaces[source as usize] else { return };
-    let color = rgb(color(cx, source, SceneLayer::Membrane));
-    for (finger, mesh) in held.fingers.entries() {
-        let finger = cx.state.finger_name(finger);
-        scene.meshes.push(items::membrane(&finger, (held.revision, mesh.clone()), color, OPACITY));
-    }
-}
-
-/// The point that was clicked.
-fn picked(cx: &Cx<'_>, source: ImprintSource, scene: &mut SceneData) {
-    let point = cx.state.workbench.picked.filter(|picked| picked.source == source).and_then(|picked| {
-        let cloud = results::cloud(cx.state, source).ready()?.finger(picked.finger)?;
-        cloud.points.get(cloud.at_pixel(picked.pixel[0].into(), picked.pixel[1].into())?).copied()
-    });
-    if let Some(point) = point {
-        scene.clouds.push(one_point("picked", point, cx.p.accent, 11.0));
-    }
-}
-
 /// A cloud of a single point, as large on the screen at any distance.
 fn one_point(name: &str, point: DVec3, color: Color32, px: f32) -> CloudItem {
     let bits = point.to_array().map(f64::to_bits);
@@ -199,19 +189,6 @@ fn one_point(name: &str, point: DVec3, color: Color32, px: f32) -> CloudItem {
         points: [point].into(),
         colors: PointColors::One,
         style: CloudStyle { color: rgb(color), size: PointSize::Px(px), ..CloudStyle::default() },
-    }
-}
-
-/// The pixel under the pointer, as a point of its own: it must not drown among the others.
-fn pointed(cx: &Cx<'_>, source: ImprintSource, scene: &mut SceneData) {
-    let state = cx.state;
-    let pointed = state.selection.hover.and_then(|h| {
-        let cloud = results::cloud(state, source).ready()?.finger(h.finger)?;
-        let (x, y) = (h.at_px[0].round().max(0.0) as usize, h.at_px[1].round().max(0.0) as usize);
-        cloud.points.get(cloud.at_pixel(x, y)?).copied()
-    });
-    if let Some(point) = pointed {
-        scene.clouds.push(one_point("pointer", point, cx.p.strong, 9.0));
     }
 }
 
@@ -268,31 +245,11 @@ fn meshes(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, scene: &mut Scene
             item.style = MeshStyle {
                 look: if through { Look::XRay } else { Look::Solid },
                 opacity: if through { 0.6 } else { 1.0 },
-                edges: Some(model_edges(cx, color)),
+                edges: Some(items::model_edges(rgb(color), rgb(cx.p.canvas))),
                 ..item.style
             };
             layers::paint_model(memory, source, world_from_mesh, &mut item);
         }
         scene.meshes.push(item);
     }
-}
-
-/// The edges of a shaded model of a color.
-fn model_edges(cx: &Cx<'_>, color: Color32) -> EdgeStyle {
-    items::model_edges(rgb(color), rgb(cx.p.canvas))
-}
-
-/// Floor, grid and axes.
-fn guides(cx: &Cx<'_>, scene: &mut SceneData) {
-    let (ground, ink) = (rgb(cx.p.canvas), rgb(cx.p.weak));
-    scene.floor = Some(items::floor(ground, ink));
-    scene.lines.extend(items::guides(ground, ink, u64::from(*cx.p == theme::DARK)));
-}
-
-/// Length of the drawn axes, meters.
-pub(super) const AXIS: f64 = items::AXIS_M;
-
-/// A corner of the floor grid.
-pub(super) fn axes_origin() -> DVec3 {
-    items::axes_origin()
 }
