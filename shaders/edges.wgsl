@@ -38,28 +38,14 @@ fn vs_main(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance
     var out: Varying;
     out.clip = NOWHERE;
     let edge = list[instance];
-    var a = (edges.world_from_mesh * vec4<f32>(edge.a, 1.0)).xyz;
-    var b = (edges.world_from_mesh * vec4<f32>(edge.b, 1.0)).xyz;
+    let a = (edges.world_from_mesh * vec4<f32>(edge.a, 1.0)).xyz;
+    let b = (edges.world_from_mesh * vec4<f32>(edge.b, 1.0)).xyz;
     let to_eye = towards_eye(0.5 * (a + b));
     let facing_a = dot((edges.world_from_mesh * vec4<f32>(edge.normal_a.xyz, 0.0)).xyz, to_eye);
     let facing_b = dot((edges.world_from_mesh * vec4<f32>(edge.normal_b.xyz, 0.0)).xyz, to_eye);
     let always = edge.always == 2u || (edge.always == 1u && edges.creases != 0u);
     if !always && facing_a * facing_b > 0.0 {
         return out;
-    }
-    // What the planes leave of it.
-    for (var i = 0u; i < view.plane_count; i++) {
-        let plane = view.planes[i];
-        let da = dot(plane.xyz, a) + plane.w;
-        let db = dot(plane.xyz, b) + plane.w;
-        if da < 0.0 && db < 0.0 {
-            return out;
-        }
-        if da < 0.0 {
-            a = mix(a, b, da / (da - db));
-        } else if db < 0.0 {
-            b = mix(b, a, db / (db - da));
-        }
     }
     let clip_a = view.clip_from_world * vec4<f32>(a, 1.0);
     let clip_b = view.clip_from_world * vec4<f32>(b, 1.0);

@@ -15,8 +15,6 @@ struct MeshUniform {
     lo: f32,
     hi: f32,
     map: u32,
-    // 1 = what a plane lays open is filled.
-    closed: u32,
 }
 
 @group(1) @binding(0) var<uniform> mesh: MeshUniform;
@@ -47,17 +45,7 @@ fn vs_main(
 }
 
 @fragment
-fn fs_main(in: Varying, @builtin(front_facing) outside: bool) -> @location(0) vec4<f32> {
-    if view.plane_count > 0u {
-        if is_cut(in.in_world) {
-            discard;
-        }
-        if mesh.closed != 0u && mesh.xray == 0u && !outside {
-            // The inside of a closed surface is seen only through the cut: drawn flat and hatched it is the cut.
-            let stripe = fract((in.clip.x + in.clip.y) / 7.0) < 0.2;
-            return vec4<f32>(mesh.color.rgb * select(0.72, 0.4, stripe), 1.0);
-        }
-    }
+fn fs_main(in: Varying) -> @location(0) vec4<f32> {
     let to_eye = towards_eye(in.in_world);
     // The side that is seen is lit, whichever way the triangle was wound.
     var normal = normalize(in.normal);
@@ -105,8 +93,5 @@ fn fs_veil_thin(in: Varying) -> @location(0) vec4<f32> {
 // Depth alone: what the nearest layer of a veil is.
 @fragment
 fn fs_depth(in: Varying) -> @location(0) vec4<f32> {
-    if is_cut(in.in_world) {
-        discard;
-    }
     return vec4<f32>(0.0);
 }

@@ -11,7 +11,6 @@ struct PointsUniform {
     world_from_points: mat4x4<f32>,
     // One color for all (mode 2), and the opacity.
     color: vec4<f32>,
-    highlight: vec4<f32>,
     // Values at the ends of the color map (mode 1).
     lo: f32,
     hi: f32,
@@ -22,10 +21,6 @@ struct PointsUniform {
     map: u32,
     // Every stride-th point is drawn.
     stride: u32,
-    // Instances before the one extra instance that is the highlighted point.
-    drawn: u32,
-    // Index of the highlighted point; 0xffffffff for none.
-    selected: u32,
 }
 
 @group(1) @binding(0) var<uniform> cloud: PointsUniform;
@@ -35,8 +30,8 @@ struct Varying {
     @builtin(position) clip: vec4<f32>,
     @location(0) corner: vec2<f32>,
     @location(1) @interpolate(flat) color: vec4<f32>,
-    // Radius in pixels, plus 1 for a highlighted point's ring (in y).
-    @location(2) @interpolate(flat) radius: vec2<f32>,
+    // Pixels.
+    @location(2) @interpolate(flat) radius: f32,
     @location(3) @interpolate(flat) to_eye: vec3<f32>,
 }
 
@@ -44,15 +39,13 @@ struct Varying {
 fn vs_main(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance: u32) -> Varying {
     var out: Varying;
     out.clip = NOWHERE;
-    let is_extra = instance == cloud.drawn;
-    let index = select(instance * cloud.stride, cloud.selected, is_extra);
-    let point = points[index];
+    let point = points[instance * cloud.stride];
     if is_hidden(point.position) {
         return out;
     }
     let in_world = cloud.world_from_points * vec4<f32>(point.position, 1.0);
-    var clip = view.clip_from_world * in_world;
-    if clip.w <= 0.0 || is_cut(in_world.xyz) {
+    let clip = view.clip_from_world * in_world;
+    if clip.w <= 0.0 {
         return out;
     }
     var diameter = cloud.size * view.unit_px;
@@ -60,19 +53,12 @@ fn vs_main(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance
         diameter = cloud.size * view.px_per_m / clip.w;
     }
     // Below one pixel a disc would vanish between the samples.
-    var radius = max(0.5 * diameter, 0.5);
-    if is_extra {
-        radius = max(radius * 2.0, radius + 3.0);
-        // In front of its neighbors, and of the unmarked disc of the same point.
-        clip.z = min(clip.z * 1.02 , clip.w);
-    }
+    let radius = max(0.5 * diameter, 0.5);
     out.to_eye = towards_eye(in_world.xyz);
     out.corner = quad_corner(vertex);
     out.clip = offset_px(clip, out.corner * radius);
-    out.radius = vec2<f32>(radius, f32(is_extra));
-    if is_extra {
-        out.color = cloud.highlight;
-    } else if cloud.color_mode == 0u {
+    out.radius = radius;
+    if cloud.color_mode == 0u {
         out.color = unpack4x8unorm(point.payload) * vec4<f32>(1.0, 1.0, 1.0, cloud.color.a);
     } else if cloud.color_mode == 1u {
         out.color = vec4<f32>(scalar_color(cloud.map, point.payload, cloud.lo, cloud.hi), cloud.color.a);
@@ -85,14 +71,10 @@ fn vs_main(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance
 @fragment
 fn fs_main(in: Varying) -> @location(0) vec4<f32> {
     // Discs of one or two pixels are squares: cutting their corners leaves holes.
-    if in.radius.x > 1.25 && dot(in.corner, in.corner) > 1.0 {
+    if in.radius > 1.25 && dot(in.corner, in.corner) > 1.0 {
         discard;
     }
-    if in.radius.y > 0.5 && dot(in.corner, in.corner) > 0.55 {
-        // A dark rim keeps the highlight visible on any color.
-        return vec4<f32>(in.color.rgb * 0.15, 1.0);
-    }
-    if cloud.color_mode == 2u && in.radius.x > 1.25 && in.radius.y < 0.5 {
+    if cloud.color_mode == 2u && in.radius > 1.25 {
         // A color that says nothing but which cloud it is may be shaded: a bead instead of a disc.
         let up = view.up_in_world.xyz;
         let depth = sqrt(max(1.0 - dot(in.corner, in.corner), 0.0));

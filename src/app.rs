@@ -5,7 +5,7 @@
 //! * [`command::Command`] is what can happen to it, by room; [`apply::apply`] is the only writer and is pure:
 //!   work and files come out as [`effect::Effect`]s.
 //! * A room is a feature ([`library`], [`follow`], [`view`], [`predict`], [`labels`], [`inspect`],
-//!   [`workbench`], [`evaluate`], [`export`], [`adapt`], [`train`], [`settings`], [`tasks`]): its file has its commands
+//!   [`workbench`], [`evaluate`], [`export`], [`doctor`], [`learn`], [`settings`], [`tasks`]): its file has its commands
 //!   and what they do.
 //! * [`recipe`] is what the settings say, with the models that are there; [`results`] says how each result is computed and
 //!   looked up.

@@ -8,6 +8,9 @@
 //! * `gpu`, `ui` (feature `gui`): the renderer and the studio.
 //! * [`headless`]: the command line, from the same code as the studio.
 
+#[macro_use]
+mod tables;
+
 #[cfg_attr(
     not(feature = "gui"),
     allow(dead_code, unused_imports, reason = "without the window nobody asks for what only views show")

@@ -17,9 +17,10 @@ use touch2touch::gpu::points::{CloudItem, CloudStyle, PointColors, PointSize};
 use touch2touch::gpu::raster::Raster;
 use touch2touch::gpu::scene::{SceneData, SceneRenderer};
 use touch2touch::gpu::target::{Picture, Target};
-use touch2touch::gpu::view::{Camera, Plane, Preset};
+use touch2touch::gpu::view::{Camera, Part};
 use touch2touch::gpu::{Gpu, GpuError, guides, wgpu};
 use touch2touch_core::colormap::{ColorMap, Range};
+use touch2touch_core::frames::CameraPreset;
 use touch2touch_core::mesh::TriMesh;
 
 use crate::support;
@@ -49,7 +50,8 @@ impl View {
     }
 
     fn render(&mut self, scene: &SceneData) -> bool {
-        self.renderer.render(&self.gpu, scene, &self.camera, &self.target).unwrap()
+        let part = Part::whole(self.target.size());
+        self.renderer.render(&self.gpu, scene, (&self.camera, part), &self.target).unwrap()
     }
 
     fn picture(&mut self, scene: &SceneData) -> Picture {
@@ -110,7 +112,7 @@ fn inked(picture: &Picture) -> Vec<[u32; 2]> {
 fn a_point_appears_at_its_pixel_in_its_color_and_size() {
     let Some(mut view) = View::new() else { return };
     for orthographic in [false, true] {
-        for preset in [None, Some(Preset::Left), Some(Preset::Top)] {
+        for preset in [None, Some(CameraPreset::Left), Some(CameraPreset::Top)] {
             view.camera = Camera { orthographic, ..Camera::default() };
             if let Some(preset) = preset {
                 view.camera.look_from(preset);
@@ -197,12 +199,12 @@ fn grid_and_axes_are_where_they_belong() {
         let [x, y] = view.camera.project(p, SIZE).map(|(px, _)| [px.x as u32, px.y as u32]).unwrap();
         picture.rgb(x, y).unwrap()
     };
-    let x_axis = DVec3::X * 0.004;
-    view.renderer.render(&view.gpu, &scene, &view.camera, &view.target).unwrap();
+    let (x_axis, whole) = (DVec3::X * 0.004, Part::whole(SIZE));
+    view.renderer.render(&view.gpu, &scene, (&view.camera, whole), &view.target).unwrap();
     let [r, g, b] = at(&view.target.read(&view.gpu).unwrap(), x_axis);
     assert!(r == g && g == b && r < 80, "the black mesh and what it mirrors: {r} {g} {b}");
     scene.lines[1].style.overlay = true;
-    view.renderer.render(&view.gpu, &scene, &view.camera, &view.target).unwrap();
+    view.renderer.render(&view.gpu, &scene, (&view.camera, whole), &view.target).unwrap();
     assert_eq!(at(&view.target.read(&view.gpu).unwrap(), x_axis), [226, 88, 80]);
 }
 
@@ -210,7 +212,7 @@ fn grid_and_axes_are_where_they_belong() {
 fn the_color_maps_of_gpu_and_cpu_are_the_same() {
     let Some(mut view) = View::new() else { return };
     view.camera.orthographic = true;
-    view.camera.look_from(Preset::Front);
+    view.camera.look_from(CameraPreset::Front);
     let mut values: Vec<f32> = (0..=60).map(|i| -0.02 + 0.04 * i as f32 / 60.0).collect();
     values.extend([f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1.0, 1.0]);
     let place = |i: usize| {
@@ -276,8 +278,8 @@ fn an_unchanged_scene_costs_nothing_and_each_change_costs_what_it_must() {
     assert_eq!(step(&mut view, &data), [0, 1, 1], "the camera alone");
     data.meshes[0].style.world_from_mesh = DAffine3::from_rotation_x(0.1);
     assert_eq!(step(&mut view, &data), [0, 1, 1], "a pose moves a mesh without sending it again");
-    data.clouds[0].style.selected = Some(0);
-    assert_eq!(step(&mut view, &data), [0, 1, 1], "a selection");
+    data.clouds[0].style.color = [0.5; 3];
+    assert_eq!(step(&mut view, &data), [0, 1, 1], "a color");
     data.clouds[0].revision = 1;
     assert_eq!(step(&mut view, &data), [1, 0, 1], "new points");
     data.moving = true;
@@ -435,34 +437,6 @@ fn distances_on_a_surface_have_the_colors_of_their_cpu_twin() {
             assert!((f64::from(found) - wanted).abs() < 3.0, "{value}: {found} {wanted}");
         }
     }
-}
-
-#[test]
-fn a_plane_cuts_meshes_and_points_and_fills_what_it_lays_open() {
-    let Some(mut view) = View::new() else { return };
-    view.camera = Camera { orthographic: true, ..Camera::default() };
-    let back = view.camera.axes()[2];
-    let style = MeshStyle { color: [0.9, 0.1, 0.1], ..MeshStyle::default() };
-    let ball = MeshItem { ..mesh_item(sphere(0.02, 32), style) };
-    let inner = cloud(&[back * 0.012], &[[0, 255, 0]], PointSize::Px(9.0));
-    let mut picture = |cut: Vec<Plane>, closed: bool| {
-        let mesh = MeshItem { style: MeshStyle { closed, ..style }, ..ball.clone() };
-        view.picture(&SceneData { meshes: vec![mesh], clouds: vec![inner.clone()], cut, ..scene() })
-    };
-    let center = [SIZE[0] / 2, SIZE[1] / 2];
-    let whole = picture(vec![], true);
-    let red = whole.rgb(center[0], center[1]).unwrap();
-    assert!(red[0] > 150 && red[1] < 120, "the ball hides the point: {red:?}");
-    // The near half goes away, and the point with it: one sees the cut, flat and hatched.
-    let open = picture(vec![Plane::through(DVec3::ZERO, -back)], true);
-    let reds: std::collections::BTreeSet<u8> = (0..7).map(|i| open.rgb(center[0] + i, center[1]).unwrap()[0]).collect();
-    assert_eq!(reds.len(), 2, "a flat color and its stripes: {reds:?}");
-    let bowl = picture(vec![Plane::through(DVec3::ZERO, -back)], false);
-    assert!(!reds.contains(&bowl.rgb(center[0], center[1]).unwrap()[0]), "an open surface is lit, not filled");
-    // The far half goes away: nothing changes for the eye.
-    assert_eq!(picture(vec![Plane::through(DVec3::ZERO, back)], true).rgb(center[0], center[1]), Some(red));
-    // Everything goes away.
-    assert!(inked(&picture(vec![Plane::through(back, back)], true)).is_empty());
 }
 
 #[test]

@@ -208,12 +208,12 @@ fn assets_stay_small() {
 #[test]
 fn no_text_of_the_window_says_a_key_by_hand() {
     use strum::IntoEnumIterator as _;
-    use touch2touch::app::action::{Action, Key};
+    use touch2touch::app::action::Action;
     let mut files = Vec::new();
     rust_files(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src/ui"), &mut files);
     // Escape closes what covers the panes and Enter takes what was typed, whatever their actions are.
     let keys = Action::iter().flat_map(|action| action.keys().iter().copied());
-    let keys: Vec<_> = keys.filter(|key| !matches!(key.key, Key::Escape | Key::Enter)).collect();
+    let keys: Vec<_> = keys.filter(|key| !matches!(key.key, "Esc" | "Enter")).collect();
     let mut filled = 0;
     for file in files {
         let text = code(&std::fs::read_to_string(&file).unwrap());

@@ -12,13 +12,9 @@ struct ViewUniform {
     key_in_world: vec4<f32>,
     // How clip depth becomes meters in front of the eye, see meters_of.
     depth: vec4<f32>,
-    // Normal and offset: what has dot(normal, p) + offset < 0 is cut away.
-    planes: array<vec4<f32>, 8>,
     size_px: vec2<f32>,
     // Pixels per meter where clip w = 1; divide by clip w for any other place.
     px_per_m: f32,
-    // How many of the planes cut.
-    plane_count: u32,
     // Pixels that stand for one pixel of a screen: a still of four times the size has lines of four times the width.
     unit_px: f32,
 }
@@ -57,16 +53,6 @@ fn meters_of(z: f32) -> f32 {
 
 fn depth_parallel(z: f32) -> f32 {
     return view.depth.x - view.depth.y * z;
-}
-
-// Whether a point lies behind one of the cutting planes.
-fn is_cut(p_in_world: vec3<f32>) -> bool {
-    for (var i = 0u; i < view.plane_count; i++) {
-        if dot(view.planes[i].xyz, p_in_world) + view.planes[i].w < 0.0 {
-            return true;
-        }
-    }
-    return false;
 }
 
 // Two triangles that cover -1..1, vertex 0..5.

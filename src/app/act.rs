@@ -18,6 +18,7 @@ use super::state::labels::Review;
 use super::state::library::Place;
 use super::state::settings::{ColorRange, MaskTool};
 use super::state::tasks::TaskKind;
+use super::state::view::Purpose;
 use super::state::workbench::{Layer, SceneTool};
 use super::state::{Absent, State};
 use super::{export, results};

@@ -2,46 +2,35 @@
 //! commands in its rows are spelt in [`super::act`].
 
 mod here;
-mod key;
+mod shortcut;
 
 use strum::{EnumIter, EnumString, IntoEnumIterator, IntoStaticStr};
 
-pub use key::{Key, Shortcut};
-use key::{alt, alt_shift, ctrl, ctrl_shift, plain, shift};
+pub use shortcut::Shortcut;
+use shortcut::{alt, alt_shift, ctrl, ctrl_shift, plain, shift};
 
-/// The part of the shortcut sheet an action stands in.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, EnumIter)]
-pub enum Group {
-    /// Opening and saving.
-    File,
-    /// From pair to pair.
-    Navigate,
-    /// Predictions.
-    Generate,
-    /// Contact masks.
-    Mask,
-    /// Registration.
-    Pose,
-    /// The view: what is shown, and how.
-    View,
-    /// Help.
-    Help,
+with_texts! {
+    /// The part of the shortcut sheet an action stands in.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, EnumIter)]
+    pub enum Group(name) {
+        /// Opening and saving.
+        File = "File",
+        /// From pair to pair.
+        Navigate = "Navigate",
+        /// Predictions.
+        Generate = "Generate",
+        /// Contact masks.
+        Mask = "Mask",
+        /// Registration.
+        Pose = "Pose",
+        /// The view: what is shown, and how.
+        View = "View",
+        /// Help.
+        Help = "Help",
+    }
 }
 
 impl Group {
-    /// The heading.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::File => "File",
-            Self::Navigate => "Navigate",
-            Self::Generate => "Generate",
-            Self::Mask => "Mask",
-            Self::Pose => "Pose",
-            Self::View => "View",
-            Self::Help => "Help",
-        }
-    }
-
     /// The actions, in the order of the table.
     pub fn actions(self) -> impl Iterator<Item = Action> {
         Action::iter().filter(move |action| action.group() == self)
@@ -53,55 +42,55 @@ impl Group {
 macro_rules! actions {
     ($with:ident) => {
         $with! {
-        OpenFolder, File, "Open folder…", "Opens a folder of the lab's files or of image pairs", [ctrl(K::O), ctrl_shift(K::O)],
-            _ => ui(UiRequest::PickFolder);
+        OpenFolder, File, "Open folder…", "Opens a folder of the lab's files or of image pairs", [ctrl("O"), ctrl_shift("O")],
+            _ => ui(UiRequest::Pick(Purpose::Folder));
         OpenDemo, File, "Open the demo", "Opens the built-in simulated data", [],
             _ => does(LibraryCommand::Open(Place::Demo));
-        Follow, File, "Follow the folder", "Shows and predicts each new touch in the open folder; again to stop", [ctrl_shift(K::F)],
+        Follow, File, "Follow the folder", "Shows and predicts each new touch in the open folder; again to stop", [ctrl_shift("F")],
             state => follow(state);
-        Reload, File, "Reload", "Reads the open data set again", [plain(K::F5)],
+        Reload, File, "Reload", "Reads the open data set again", [plain("F5")],
             state => opened(state, LibraryCommand::Reload);
         AboutData, File, "About this data", "What is in this data set, how well the models do on it, and what would help", [],
             state => opened(state, DoctorCommand::Show(!state.doctor.shown));
-        Save, File, "Save now", "Saves labels and preferences now; this also happens after every change", [ctrl(K::S)],
+        Save, File, "Save now", "Saves labels and preferences now; this also happens after every change", [ctrl("S")],
             _ => does(LabelsCommand::Save);
         ExportMeasured, File, "Export the measured pair…", "Writes point cloud (PLY), pose (JSON) and CAD model in the hand (STL), from the measured imprint", [],
             state => export(state, ImprintSource::Measured);
         ExportPredicted, File, "Export the predicted pair…", "Writes point cloud (PLY), pose (JSON) and CAD model in the hand (STL), from the predicted imprint", [],
             state => export(state, ImprintSource::Predicted);
-        ExportMasks, File, "Export masks…", "Writes masks as a folder for UNet training, or as PNG only", [ctrl(K::E)],
+        ExportMasks, File, "Export masks…", "Writes masks as a folder for UNet training, or as PNG only", [ctrl("E")],
             state => opened(state, ExportCommand::AskMasks(true));
         ImportMasks, File, "Import masks…", "Reads masks from a folder of PNG files with the names of an export; what you drew stays", [],
-            state => opened(state, ViewCommand::Ui(UiRequest::PickMasks));
+            state => opened(state, ViewCommand::Ui(UiRequest::Pick(Purpose::Masks)));
 
-        PreviousPair, Navigate, "Previous pair", "Shows the previous pair of the list", [plain(K::A), plain(K::PageUp)],
+        PreviousPair, Navigate, "Previous pair", "Shows the previous pair of the list", [plain("A"), plain("PgUp")],
             state => listed(state, LibraryCommand::Step(-1));
-        NextPair, Navigate, "Next pair", "Shows the next pair of the list", [plain(K::D), plain(K::PageDown)],
+        NextPair, Navigate, "Next pair", "Shows the next pair of the list", [plain("D"), plain("PgDn")],
             state => listed(state, LibraryCommand::Step(1));
-        TenBack, Navigate, "10 back", "Moves 10 pairs back in the list", [shift(K::A)],
+        TenBack, Navigate, "10 back", "Moves 10 pairs back in the list", [shift("A")],
             state => listed(state, LibraryCommand::Step(-10));
-        TenForward, Navigate, "10 forward", "Moves 10 pairs forward in the list", [shift(K::D)],
+        TenForward, Navigate, "10 forward", "Moves 10 pairs forward in the list", [shift("D")],
             state => listed(state, LibraryCommand::Step(10));
-        FirstPair, Navigate, "First pair", "Shows the first pair of the list", [plain(K::Home)],
+        FirstPair, Navigate, "First pair", "Shows the first pair of the list", [plain("Home")],
             state => listed(state, LibraryCommand::First);
-        LastPair, Navigate, "Last pair", "Shows the last pair of the list", [plain(K::End)],
+        LastPair, Navigate, "Last pair", "Shows the last pair of the list", [plain("End")],
             state => listed(state, LibraryCommand::Last);
-        NextUnfinished, Navigate, "Next unfinished", "Shows the next pair that is neither done nor skipped", [shift(K::N)],
+        NextUnfinished, Navigate, "Next unfinished", "Shows the next pair that is neither done nor skipped", [shift("N")],
             state => listed(state, LibraryCommand::NextUnfinished);
-        NextWorst, Navigate, "Next worst", "Shows the worst pair by the chosen score, then the second worst, and so on", [plain(K::N)],
+        NextWorst, Navigate, "Next worst", "Shows the worst pair by the chosen score, then the second worst, and so on", [plain("N")],
             state => listed(state, LibraryCommand::NextWorst).filter(|_| state.table.by().is_some());
-        OtherFinger, Navigate, "Other finger", "Switches to the other finger", [plain(K::U)],
+        OtherFinger, Navigate, "Other finger", "Switches to the other finger", [plain("U")],
             state => does(ViewCommand::SelectFinger(state.other_finger()));
-        BothFingers, Navigate, "Both fingers", "Shows both fingers, or only the active one", [shift(K::U)],
+        BothFingers, Navigate, "Both fingers", "Shows both fingers, or only the active one", [shift("U")],
             state => does(ViewCommand::ShowBothFingers(!state.selection.both_fingers));
-        FindPair, Navigate, "Filter pairs", "Goes to the filter of the list", [ctrl(K::F)],
+        FindPair, Navigate, "Filter pairs", "Goes to the filter of the list", [ctrl("F")],
             state => when(state.selection.panes.contains(&Pane::Browser), ViewCommand::Ui(UiRequest::FocusFilter));
 
-        Generate, Generate, "Generate", "Predicts the Soft Bubble imprint from the GelSlim image", [ctrl(K::G)],
+        Generate, Generate, "Generate", "Predicts the Soft Bubble imprint from the GelSlim image", [ctrl("G")],
             state => when(results::can_generate(state).is_ok(), PredictCommand::Generate);
-        GenerateNewSeed, Generate, "Generate with a new seed", "Draws a new seed and generates", [ctrl_shift(K::G)],
+        GenerateNewSeed, Generate, "Generate with a new seed", "Draws a new seed and generates", [ctrl_shift("G")],
             state => when(results::can_generate(state).is_ok(), PredictCommand::GenerateNewSeed);
-        LockSeed, Generate, "Lock the seed", "Keeps the seed, or draws a new one each time you generate", [ctrl(K::L)],
+        LockSeed, Generate, "Lock the seed", "Keeps the seed, or draws a new one each time you generate", [ctrl("L")],
             _ => does(prefer(|s| s.generate.seed_locked ^= true));
         FitPairs, Generate, "Fit to my pairs", "Fits the generator to the open pairs, and says what it is worth on pairs that were left out", [],
             state => when(learn::can_start(state, Network::Generator), LearnCommand::Start(Network::Generator));
@@ -110,43 +99,43 @@ macro_rules! actions {
         PredictAll, Generate, "Predict all", "Predicts and scores every pair of the open data set with the chosen generators; what was scored before is not computed again", [],
             state => when(can_score_all(state), EvaluateCommand::Start);
         ExportTable, Generate, "Export the results table…", "Writes the results table as CSV and JSON", [],
-            state => when(state.table.result.is_some(), ViewCommand::Ui(UiRequest::PickTableFolder));
-        CancelJobs, Generate, "Cancel", "Closes a dialog, drops a stroke, rejects a suggestion; else stops what is running", [plain(K::Escape)],
+            state => when(state.table.result.is_some(), ViewCommand::Ui(UiRequest::Pick(Purpose::Table)));
+        CancelJobs, Generate, "Cancel", "Closes a dialog, drops a stroke, rejects a suggestion; else stops what is running", [plain("Esc")],
             state => cancel(state);
-        NextShift, Generate, "Next depth scale", "Cycles through the depth scales: uncorrected, as in the paper, calibrated, matched to this data set", [shift(K::P)],
+        NextShift, Generate, "Next depth scale", "Cycles through the depth scales: uncorrected, as in the paper, calibrated, matched to this data set", [shift("P")],
             state => next_shift(state);
         Refit, Generate, "Match depths to this data set", "Matches the mean and deviation of predicted depths to the measurements of this data set (refit)", [],
             state => when(results::can_generate(state).is_ok(), PredictCommand::Refit);
 
-        Brush, Mask, "Brush", "Paints the mask; the right button erases", [plain(K::Num1), plain(K::B)],
+        Brush, Mask, "Brush", "Paints the mask; the right button erases", [plain("1"), plain("B")],
             _ => does(prefer(|s| s.mask.tool = MaskTool::Brush));
-        Eraser, Mask, "Eraser", "Erases the mask", [plain(K::Num2), plain(K::E)],
+        Eraser, Mask, "Eraser", "Erases the mask", [plain("2"), plain("E")],
             _ => does(prefer(|s| s.mask.tool = MaskTool::Eraser));
-        Lasso, Mask, "Lasso", "Adds the area you outline; the right button removes it", [plain(K::L)],
+        Lasso, Mask, "Lasso", "Adds the area you outline; the right button removes it", [plain("L")],
             _ => does(prefer(|s| s.mask.tool = MaskTool::Lasso));
-        Polygon, Mask, "Polygon", "Adds the area between the corners you click; Enter or the first corner closes it, Backspace takes a corner back, the right button removes", [plain(K::P)],
+        Polygon, Mask, "Polygon", "Adds the area between the corners you click; Enter or the first corner closes it, Backspace takes a corner back, the right button removes", [plain("P")],
             _ => does(prefer(|s| s.mask.tool = MaskTool::Polygon));
-        RectangleTool, Mask, "Rectangle", "Adds a rectangle; the right button removes", [plain(K::R)],
+        RectangleTool, Mask, "Rectangle", "Adds a rectangle; the right button removes", [plain("R")],
             _ => does(prefer(|s| s.mask.tool = MaskTool::Rectangle));
-        Wand, Mask, "Wand", "Adds the connected area of about the same depth; drag right for more", [plain(K::M)],
+        Wand, Mask, "Wand", "Adds the connected area of about the same depth; drag right for more", [plain("M")],
             _ => does(prefer(|s| s.mask.tool = MaskTool::Wand));
-        PanTool, Mask, "Move the image", "Dragging moves the image instead of drawing", [plain(K::Num8)],
+        PanTool, Mask, "Move the image", "Dragging moves the image instead of drawing", [plain("8")],
             _ => does(prefer(|s| s.mask.tool = MaskTool::Pan));
-        PaintIn3d, Mask, "Draw in 3D", "Mask tools draw on the 3D views; off: dragging turns the view", [alt(K::B)],
+        PaintIn3d, Mask, "Draw in 3D", "Mask tools draw on the 3D views; off: dragging turns the view", [alt("B")],
             state => toggle(state, SceneTool::Paint);
-        PaintLayers, Mask, "Draw through all layers", "Drawing in 3D also marks hidden points; off: only those in front", [alt(K::L)],
+        PaintLayers, Mask, "Draw through all layers", "Drawing in 3D also marks hidden points; off: only those in front", [alt("L")],
             _ => does(prefer(|s| s.mask.layers = s.mask.layers.other()));
-        PaintIgnore, Mask, "Paint ignored pixels", "Tools mark pixels to ignore, neither contact nor free; off: they paint contact", [shift(K::B)],
+        PaintIgnore, Mask, "Paint ignored pixels", "Tools mark pixels to ignore, neither contact nor free; off: they paint contact", [shift("B")],
             _ => does(paint(Paint::Ignore));
-        LastTool, Mask, "Last tool", "Goes back to the previous tool", [plain(K::Q)],
+        LastTool, Mask, "Last tool", "Goes back to the previous tool", [plain("Q")],
             _ => does(prefer(|s| s.mask.tool = s.mask.last_tool));
-        BrushSmaller, Mask, "Smaller brush", "Makes the brush smaller", [plain(K::OpenBracket)],
+        BrushSmaller, Mask, "Smaller brush", "Makes the brush smaller", [plain("[")],
             _ => does(prefer(|s| s.mask.radius_px /= BRUSH_STEP));
-        BrushLarger, Mask, "Larger brush", "Makes the brush larger", [plain(K::CloseBracket)],
+        BrushLarger, Mask, "Larger brush", "Makes the brush larger", [plain("]")],
             _ => does(prefer(|s| s.mask.radius_px *= BRUSH_STEP));
-        FillHoles, Mask, "Fill holes", "Fills the holes of the mask", [plain(K::H)],
+        FillHoles, Mask, "Fill holes", "Fills the holes of the mask", [plain("H")],
             state => clean_up(state, CleanKind::FillHoles);
-        LargestIsland, Mask, "Largest island", "Keeps only the largest connected part of the mask", [plain(K::K)],
+        LargestIsland, Mask, "Largest island", "Keeps only the largest connected part of the mask", [plain("K")],
             state => clean_up(state, CleanKind::LargestIsland);
         SmoothMask, Mask, "Smooth the mask", "Smooths the outline, within the clean-up size", [],
             state => clean_up(state, CleanKind::Smooth);
@@ -154,19 +143,19 @@ macro_rules! actions {
             state => clean_up(state, CleanKind::Grow);
         ShrinkMask, Mask, "Shrink the mask", "Shrinks the mask by the clean-up size", [],
             state => clean_up(state, CleanKind::Shrink);
-        AdoptAutomatic, Mask, "Copy the automatic mask", "Takes the automatic mask as a start for editing", [plain(K::T)],
+        AdoptAutomatic, Mask, "Copy the automatic mask", "Takes the automatic mask as a start for editing", [plain("T")],
             state => editable(state, LabelsCommand::AdoptAutomatic);
-        Propose, Mask, "Propose a mask", "Shows a suggested mask over the current one, to accept as a whole or by brush; nothing changes until then", [plain(K::G)],
+        Propose, Mask, "Propose a mask", "Shows a suggested mask over the current one, to accept as a whole or by brush; nothing changes until then", [plain("G")],
             state => of_pair(state, ViewCommand::Propose(!state.selection.proposing));
-        NextProposal, Mask, "Next proposal source", "Cycles through the sources of suggestions: automatic, CAD distance, strokes", [shift(K::G)],
+        NextProposal, Mask, "Next proposal source", "Cycles through the sources of suggestions: automatic, CAD distance, strokes", [shift("G")],
             _ => does(prefer(|s| s.mask.proposal = next_of(&s.mask.proposal)));
-        LetThrough, Mask, "Let the proposal through", "Tools accept the suggestion where they paint; off: they paint contact", [shift(K::L)],
+        LetThrough, Mask, "Let the proposal through", "Tools accept the suggestion where they paint; off: they paint contact", [shift("L")],
             state => does(paint(Paint::LetThrough)).filter(|_| state.settings.mask.paint == Paint::LetThrough || results::proposes(state));
-        ResetMask, Mask, "Back to the automatic mask", "Removes what you drew", [shift(K::T)],
+        ResetMask, Mask, "Back to the automatic mask", "Removes what you drew", [shift("T")],
             state => editable(state, LabelsCommand::ResetMask).filter(|_| is_corrected(state));
-        Undo, Mask, "Undo", "Undoes the last change to what is on screen, or the last polygon corner", [ctrl(K::Z)],
+        Undo, Mask, "Undo", "Undoes the last change to what is on screen, or the last polygon corner", [ctrl("Z")],
             state => undo(state);
-        Redo, Mask, "Redo", "Redoes what was undone", [ctrl_shift(K::Z), ctrl(K::Y)],
+        Redo, Mask, "Redo", "Redoes what was undone", [ctrl_shift("Z"), ctrl("Y")],
             state => when(state.history.next_redo(state.pair_name(), &results::mask_places(state)).is_some(), LabelsCommand::Redo);
         TrainMasks, Mask, "Train mask model…", "Shows from how many corrected masks the mask model would learn, and trains it in the background", [],
             _ => does(LearnCommand::Show(Network::Masks));
@@ -174,24 +163,24 @@ macro_rules! actions {
             state => when(learn::can_start(state, Network::Masks), LearnCommand::Start(Network::Masks));
         UseTrained, Mask, "Use the trained mask model", "Makes automatic masks with the model that was trained on these pairs", [],
             state => can_use(state, Network::Masks);
-        MaskVisible, Mask, "Show the mask", "Shows or hides the mask over the images", [plain(K::S)],
+        MaskVisible, Mask, "Show the mask", "Shows or hides the mask over the images", [plain("S")],
             _ => does(prefer(|s| s.mask_visible ^= true));
-        MaskOutline, Mask, "Mask as outline", "Shows only the outline of the mask", [shift(K::S)],
+        MaskOutline, Mask, "Mask as outline", "Shows only the outline of the mask", [shift("S")],
             _ => does(prefer(|s| s.mask_outline ^= true));
-        MaskFainter, Mask, "Mask fainter", "Makes the mask more transparent", [plain(K::Minus)],
+        MaskFainter, Mask, "Mask fainter", "Makes the mask more transparent", [plain("-")],
             _ => does(prefer(|s| s.mask_opacity -= OPACITY_STEP));
-        MaskStronger, Mask, "Mask stronger", "Makes the mask less transparent", [plain(K::Equals)],
+        MaskStronger, Mask, "Mask stronger", "Makes the mask less transparent", [plain("=")],
             _ => does(prefer(|s| s.mask_opacity += OPACITY_STEP));
-        DoneAndNext, Mask, "Done and next", "Marks the pair done, with the masks on screen, and goes to the next unfinished one", [ctrl(K::Enter)],
+        DoneAndNext, Mask, "Done and next", "Marks the pair done, with the masks on screen, and goes to the next unfinished one", [ctrl("Enter")],
             state => editable(state, LibraryCommand::DoneAndNext);
-        Flag, Mask, "Flag", "Marks the pair as doubtful", [plain(K::Exclamationmark)],
+        Flag, Mask, "Flag", "Marks the pair as doubtful", [plain("!")],
             state => editable(state, LabelsCommand::SetReview(Review::Flagged));
-        Skip, Mask, "Skip", "Leaves the pair out", [ctrl(K::Backspace)],
+        Skip, Mask, "Skip", "Leaves the pair out", [ctrl("Backspace")],
             state => editable(state, LabelsCommand::SetReview(Review::Skip));
         MarkTodo, Mask, "Back to todo", "Clears the review state", [],
             state => editable(state, LabelsCommand::SetReview(Review::Todo));
 
-        RunPose, Pose, "Try again", "Computes again what failed", [ctrl(K::R)],
+        RunPose, Pose, "Try again", "Computes again what failed", [ctrl("R")],
             state => of_pair(state, TasksCommand::Retry);
         TryTools, Pose, "Try all tools", "Fits every CAD model of the data set to this pair and ranks them: which tool is it?", [],
             state => of_pair(state, WorkbenchCommand::TryTools(true));
@@ -199,66 +188,66 @@ macro_rules! actions {
             state => accept(state, ImprintSource::Measured);
         AcceptPredictedPose, Pose, "Accept the predicted pose", "Saves the pose of the predicted imprint with the pair", [],
             state => accept(state, ImprintSource::Predicted);
-        PoseTool, Pose, "Pose tool", "Moves the tool by hand in the 3D panes: arrow keys, or the handles", [plain(K::Z)],
+        PoseTool, Pose, "Pose tool", "Moves the tool by hand in the 3D panes: arrow keys, or the handles", [plain("Z")],
             state => toggle(state, SceneTool::Pose);
-        NudgeLeft, Pose, "Nudge -y", "Moves the tool by 0.1 mm along -y; with Shift 1 mm, with Ctrl 0.01 mm", [plain(K::ArrowLeft), shift(K::ArrowLeft), ctrl(K::ArrowLeft)],
+        NudgeLeft, Pose, "Nudge -y", "Moves the tool by 0.1 mm along -y; with Shift 1 mm, with Ctrl 0.01 mm", [plain("Left"), shift("Left"), ctrl("Left")],
             state => nudge(state, PoseAxis::Y, -1.0);
-        NudgeRight, Pose, "Nudge +y", "Moves the tool by 0.1 mm along +y; with Shift 1 mm, with Ctrl 0.01 mm", [plain(K::ArrowRight), shift(K::ArrowRight), ctrl(K::ArrowRight)],
+        NudgeRight, Pose, "Nudge +y", "Moves the tool by 0.1 mm along +y; with Shift 1 mm, with Ctrl 0.01 mm", [plain("Right"), shift("Right"), ctrl("Right")],
             state => nudge(state, PoseAxis::Y, 1.0);
-        NudgeUp, Pose, "Nudge -z", "Moves the tool by 0.1 mm along -z, to the wrist; with Shift 1 mm, with Ctrl 0.01 mm", [plain(K::ArrowUp), shift(K::ArrowUp), ctrl(K::ArrowUp)],
+        NudgeUp, Pose, "Nudge -z", "Moves the tool by 0.1 mm along -z, to the wrist; with Shift 1 mm, with Ctrl 0.01 mm", [plain("Up"), shift("Up"), ctrl("Up")],
             state => nudge(state, PoseAxis::Z, -1.0);
-        NudgeDown, Pose, "Nudge +z", "Moves the tool by 0.1 mm along +z; with Shift 1 mm, with Ctrl 0.01 mm", [plain(K::ArrowDown), shift(K::ArrowDown), ctrl(K::ArrowDown)],
+        NudgeDown, Pose, "Nudge +z", "Moves the tool by 0.1 mm along +z; with Shift 1 mm, with Ctrl 0.01 mm", [plain("Down"), shift("Down"), ctrl("Down")],
             state => nudge(state, PoseAxis::Z, 1.0);
-        TurnLeft, Pose, "Turn -", "Turns the tool by -0.5° about x; with Shift 5°, with Ctrl 0.05°", [alt(K::ArrowLeft), alt_shift(K::ArrowLeft), ctrl_shift(K::ArrowLeft)],
+        TurnLeft, Pose, "Turn -", "Turns the tool by -0.5° about x; with Shift 5°, with Ctrl 0.05°", [alt("Left"), alt_shift("Left"), ctrl_shift("Left")],
             state => nudge(state, PoseAxis::Theta, -1.0);
-        TurnRight, Pose, "Turn +", "Turns the tool by 0.5° about x; with Shift 5°, with Ctrl 0.05°", [alt(K::ArrowRight), alt_shift(K::ArrowRight), ctrl_shift(K::ArrowRight)],
+        TurnRight, Pose, "Turn +", "Turns the tool by 0.5° about x; with Shift 5°, with Ctrl 0.05°", [alt("Right"), alt_shift("Right"), ctrl_shift("Right")],
             state => nudge(state, PoseAxis::Theta, 1.0);
-        IcpFromHere, Pose, "Register from here", "Registers again, starting from the pose set by hand", [shift(K::Z)],
+        IcpFromHere, Pose, "Register from here", "Registers again, starting from the pose set by hand", [shift("Z")],
             state => when(in_hand(state), WorkbenchCommand::StartIcp);
-        Accept, Pose, "Accept", "Closes the polygon, accepts the suggested mask, or saves the pose set by hand", [plain(K::Enter)],
+        Accept, Pose, "Accept", "Closes the polygon, accepts the suggested mask, or saves the pose set by hand", [plain("Enter")],
             state => accept_shown(state);
         RevertHand, Pose, "Drop the pose by hand", "Goes back to the registered pose", [],
             state => when(state.workbench.hand.is_some(), WorkbenchCommand::RevertHand);
-        StepBack, Pose, "Previous step", "Previous step of the registration", [plain(K::Comma)],
+        StepBack, Pose, "Previous step", "Previous step of the registration", [plain(",")],
             state => inspect(state, |s| s.at > 0, InspectCommand::By(-1));
-        StepForward, Pose, "Next step", "Next step of the registration", [plain(K::Period)],
+        StepForward, Pose, "Next step", "Next step of the registration", [plain(".")],
             state => inspect(state, |s| !s.is_last(), InspectCommand::By(1));
-        FirstStep, Pose, "First step", "Where the registration started", [shift(K::Comma)],
-            state => inspect(state, |s| s.at > 0, InspectCommand::Begin);
-        LastStep, Pose, "Last step", "Where the registration ended", [shift(K::Period)],
-            state => inspect(state, |s| !s.is_last(), InspectCommand::End);
-        PlaySteps, Pose, "Play the steps", "Plays the registration, or pauses; with the pointer in the steps or a 3D view", [plain(K::Space)],
+        FirstStep, Pose, "First step", "Where the registration started", [shift(",")],
+            state => inspect(state, |s| s.at > 0, InspectCommand::BEGIN);
+        LastStep, Pose, "Last step", "Where the registration ended", [shift(".")],
+            state => inspect(state, |s| !s.is_last(), InspectCommand::END);
+        PlaySteps, Pose, "Play the steps", "Plays the registration, or pauses; with the pointer in the steps or a 3D view", [plain("Space")],
             state => inspect(state, |s| s.inspection.num_steps(s.run) > 1, InspectCommand::Play(!state.inspect.playing));
         OwnStarts, Pose, "All starts", "Back from a single start to all that the registration tries", [],
             state => when(state.inspect.start.is_some(), InspectCommand::Start(None));
         NextPoseEngine, Pose, "Next registration", "Cycles through the registration methods", [],
             _ => does(prefer(|s| s.registration = next_of(&s.registration.with_own_gate())));
 
-        LockRange, View, "Lock the color range", "Same colors in every pair; off: fitted to each", [plain(K::O)],
+        LockRange, View, "Lock the color range", "Same colors in every pair; off: fitted to each", [plain("O")],
             _ => does(prefer(|s| s.range.locked ^= true));
-        RangeOnce, View, "Fit the color range", "Fits the colors to what is shown", [plain(K::C)],
+        RangeOnce, View, "Fit the color range", "Fits the colors to what is shown", [plain("C")],
             state => of_pair(state, SettingsCommand::RangeFromShown);
-        ResetRange, View, "Reset the color range", "Sets the color range to 0 to 18 mm", [shift(K::C)],
+        ResetRange, View, "Reset the color range", "Sets the color range to 0 to 18 mm", [shift("C")],
             _ => does(prefer(|s| s.range = ColorRange::default()));
-        Fit, View, "Fit", "Fits images and 3D views to their panes", [plain(K::Num0)],
+        Fit, View, "Fit", "Fits images and 3D views to their panes", [plain("0")],
             _ => ui(UiRequest::Fit);
-        CameraLeft, View, "View from the left", "Looks along the closing axis from the left finger", [ctrl(K::Num1)],
+        CameraLeft, View, "View from the left", "Looks along the closing axis from the left finger", [ctrl("1")],
             _ => ui(UiRequest::Camera(CameraPreset::Left));
-        CameraRight, View, "View from the right", "Looks along the closing axis from the right finger", [ctrl(K::Num2)],
+        CameraRight, View, "View from the right", "Looks along the closing axis from the right finger", [ctrl("2")],
             _ => ui(UiRequest::Camera(CameraPreset::Right));
-        CameraFront, View, "View from the front", "Looks across the closing axis", [ctrl(K::Num3)],
+        CameraFront, View, "View from the front", "Looks across the closing axis", [ctrl("3")],
             _ => ui(UiRequest::Camera(CameraPreset::Front));
-        CameraBack, View, "View from the back", "Looks across the closing axis from the other side", [ctrl(K::Num5)],
+        CameraBack, View, "View from the back", "Looks across the closing axis from the other side", [ctrl("5")],
             _ => ui(UiRequest::Camera(CameraPreset::Back));
-        CameraBottom, View, "View from below", "Looks along the tool from its tip", [ctrl(K::Num6)],
+        CameraBottom, View, "View from below", "Looks along the tool from its tip", [ctrl("6")],
             _ => ui(UiRequest::Camera(CameraPreset::Bottom));
-        CameraOblique, View, "Oblique view", "The view at the start: from above a corner", [ctrl(K::Num7)],
+        CameraOblique, View, "Oblique view", "The view at the start: from above a corner", [ctrl("7")],
             _ => ui(UiRequest::Camera(CameraPreset::Oblique));
-        CameraTop, View, "View from the top", "Looks along the tool", [ctrl(K::Num4)],
+        CameraTop, View, "View from the top", "Looks along the tool", [ctrl("4")],
             _ => ui(UiRequest::Camera(CameraPreset::Top));
-        Distances, View, "Distance to the CAD", "Colors CAD model and contact points in 3D by their distance, in mm", [plain(K::V)],
+        Distances, View, "Distance to the CAD", "Colors CAD model and contact points in 3D by their distance, in mm", [plain("V")],
             state => distances(state);
-        NextLayer, View, "Next coloring", "Cycles through the colorings of the contact points: plain, residual, pixels used, distance, pull lines", [shift(K::V)],
+        NextLayer, View, "Next coloring", "Cycles through the colorings of the contact points: plain, residual, pixels used, distance, pull lines", [shift("V")],
             state => does(WorkbenchCommand::SetLayer(next_of(&state.workbench.layer)));
         NextSides, View, "Next 3D side", "Cycles through both 3D views, measured only, predicted only", [],
             state => next_sides(state);
@@ -266,13 +255,11 @@ macro_rules! actions {
             _ => does(prefer(|s| s.gel = next_of(&s.gel)));
         BothClouds, View, "Both clouds", "Shows measured and predicted points in each 3D view", [],
             state => does(WorkbenchCommand::SetBothClouds(!state.workbench.both_clouds));
-        CompareMode, View, "Next comparison", "Switches between side by side and difference in Compare", [shift(K::F)],
+        CompareMode, View, "Next comparison", "Switches between side by side and difference in Compare", [shift("F")],
             _ => does(prefer(|s| s.compare_mut().mode = next_of(&s.compare_mut().mode)));
-        SwapCompared, View, "Swap A and B", "Swaps A and B in Compare", [shift(K::R)],
+        SwapCompared, View, "Swap A and B", "Swaps A and B in Compare", [shift("R")],
             _ => does(prefer(|s| *s.compare_mut() = s.compare_mut().clone().swapped()));
-        WindowOnly, View, "GelSlim window only", "Draws in 3D only what the GelSlims see", [plain(K::W)],
-            _ => does(prefer(|s| s.scene.only_window ^= true));
-        Parallel, View, "Parallel projection", "No perspective in 3D", [plain(K::I)],
+        Parallel, View, "Parallel projection", "No perspective in 3D", [plain("I")],
             _ => does(prefer(|s| s.scene.orthographic ^= true));
         Footprint, View, "GelSlim window", "Outlines what the GelSlim sees, on bubble images", [],
             _ => does(prefer(|s| s.footprint_visible ^= true));
@@ -290,22 +277,22 @@ macro_rules! actions {
             _ => does(prefer(|s| s.workspace = Workspace::Adapt));
         ResetWorkspace, View, "Reset workspace", "Puts the panes of this workspace back to the default layout", [],
             _ => ui(UiRequest::ResetWorkspace);
-        MaximizePane, View, "Maximize pane", "Makes one pane fill the window", [plain(K::Backtick)],
+        MaximizePane, View, "Maximize pane", "Makes one pane fill the window", [plain("`")],
             _ => ui(UiRequest::ToggleMaximized);
-        Fullscreen, View, "Full screen", "Fills the screen", [plain(K::F11)],
+        Fullscreen, View, "Full screen", "Fills the screen", [plain("F11")],
             _ => ui(UiRequest::ToggleFullscreen);
-        Screenshot, View, "Screenshot", "Saves a picture of the window to your Pictures folder", [plain(K::F12)],
+        Screenshot, View, "Screenshot", "Saves a picture of the window to your Pictures folder", [plain("F12")],
             _ => ui(UiRequest::Screenshot);
-        SavePane, View, "Save this pane", "Saves a picture of the pane under the pointer, with its bar and unit", [shift(K::F12)],
+        SavePane, View, "Save this pane", "Saves a picture of the pane under the pointer, with its bar and unit", [shift("F12")],
             _ => ui(UiRequest::PanePicture { pane: None, copied: false });
-        CopyPane, View, "Copy this pane", "Copies a picture of the pane under the pointer", [ctrl(K::F12)],
+        CopyPane, View, "Copy this pane", "Copies a picture of the pane under the pointer", [ctrl("F12")],
             _ => ui(UiRequest::PanePicture { pane: None, copied: true });
-        CopyHovered, View, "Copy the hovered value", "Copies the number under the pointer", [ctrl(K::C)],
+        CopyHovered, View, "Copy the hovered value", "Copies the number under the pointer", [ctrl("C")],
             state => when(state.selection.hover.is_some(), ViewCommand::Ui(UiRequest::CopyHovered));
 
-        Palette, Help, "Command palette", "Finds any action, pane, pair or tool", [ctrl(K::P), ctrl(K::K)],
+        Palette, Help, "Command palette", "Finds any action, pane, pair or tool", [ctrl("P"), ctrl("K")],
             state => does(ViewCommand::SetPalette(!state.selection.palette));
-        ShortcutSheet, Help, "Shortcuts", "Shows the keys of all actions, and changes them", [plain(K::Questionmark), plain(K::F1)],
+        ShortcutSheet, Help, "Shortcuts", "Shows the keys of all actions, and changes them", [plain("?"), plain("F1")],
             state => does(ViewCommand::SetShortcutSheet(!state.selection.shortcut_sheet));
         ResetSettings, Help, "Reset preferences", "Sets all preferences to their defaults", [],
             _ => does(SettingsCommand::ResetSettings);
@@ -347,7 +334,6 @@ macro_rules! define {
     };
 }
 
-use Key as K;
 actions!(define);
 
 /// A text in which `[[generate]]` stands for the main shortcut of that action, or for its name where it has none.

@@ -74,7 +74,15 @@ pub(super) fn step(state: &mut State, answer: Answer, effects: &mut Vec<Effect>)
         Answer::Computed(seq, computed) if state.library.is_open(seq) => {
             let request = computed.request();
             results::keep(computed, state);
-            react(state, &request);
+            match request {
+                Request::Sample(key) if state.is_selected(key) => {
+                    settings::follow_range(state);
+                    library::say_notes(state);
+                }
+                Request::Estimate(key) if key.stage >= Stage::Cloud => workbench::refresh_cost(state),
+                Request::Run(key) => workbench::run_arrived(state, &key),
+                _ => {}
+            }
         }
         // One that comes after its result, or after Cancel, is too late.
         Answer::Previewed(ticket, preview) if state.tasks.running.get(&ticket).is_some_and(|task| !task.cancelling) => {
@@ -119,19 +127,6 @@ fn apply_result(state: &mut State, ticket: Ticket, end: &TaskResult, effects: &m
     {
         let again = before.is_some_and(|(_, place)| place == open.place);
         follow::opened(state, again, effects);
-    }
-}
-
-/// The rooms' reaction to a result that is there now.
-fn react(state: &mut State, request: &Request) {
-    match request {
-        Request::Sample(key) if state.is_selected(*key) => {
-            settings::follow_range(state);
-            library::say_notes(state);
-        }
-        Request::Estimate(key) if key.stage >= Stage::Cloud => workbench::refresh_cost(state),
-        Request::Run(key) => workbench::run_arrived(state, key),
-        _ => {}
     }
 }
 

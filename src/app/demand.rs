@@ -2,7 +2,7 @@
 //!
 //! Each result says in its own file when it is asked for; here stands what is more urgent than what.
 
-use super::keys::{ImprintSource, LabelsKey};
+use super::keys::{ImprintSource, LabelsKey, PairKey};
 use super::pane::Demand;
 use super::results;
 use super::results::Demands;
@@ -17,95 +17,70 @@ pub(crate) const PREFETCH: usize = 4;
 /// Pure: the same state wants the same. A result that is computed makes the next one possible.
 pub fn demands(state: &State) -> Vec<Request> {
     let mut wants = Demands { state, list: Vec::new() };
-    selection(&mut wants);
+    let pair = state.pair_key().filter(|_| state.shows_pair());
+    if let Some(pair) = pair {
+        wants.ask(pair);
+        wants.ask(LabelsKey(pair));
+        let sides = [ImprintSource::Measured, ImprintSource::Predicted];
+        let [measured, predicted] = sides.map(|source| results::shows_cloud(state, source));
+        let shown = state.fingers();
+        for finger in state.rig().pads() {
+            let on_screen = shown.contains(&finger);
+            let image = state.needs(Demand::Imprint(ImprintSource::Predicted)) && on_screen;
+            let compared = state.needs(Demand::Comparison) && on_screen;
+            if image || compared || predicted.1 {
+                results::want_stored(&mut wants, finger, pair.finger(finger));
+                results::want_imprint(&mut wants, finger, pair.finger(finger));
+            }
+            if predicted.1 {
+                results::want_other_finger(&mut wants, finger);
+            }
+            if compared {
+                results::want_comparison(&mut wants, finger, pair.finger(finger));
+            }
+        }
+        let drawn = state.settings.mask_visible || state.needs(Demand::Masks);
+        // While the pen is down poses would be out of date before they are there.
+        let (at_rest, tool) = (state.document.stroke.is_none(), results::tool(state).ready().is_some());
+        let posable = |source| at_rest && tool && results::cloud(state, source).ready().is_some();
+        for (source, (pose, cloud)) in sides.into_iter().zip([measured, predicted]) {
+            let seen = drawn && state.needs(Demand::Imprint(source));
+            results::want_side(&mut wants, source, [cloud, pose], |finger| seen && shown.contains(&finger));
+            if pose && posable(source) {
+                if let Some(run) = state.workbench.hand(source).and_then(|hand| hand.icp.clone()) {
+                    wants.ask(run);
+                }
+                results::want_layers(&mut wants, source);
+                results::want_deviation(&mut wants, source);
+            }
+        }
+        if posable(state.inspect.source) {
+            results::want_inspection(&mut wants);
+        }
+        results::want_proposal(&mut wants);
+        results::want_predictions_ahead(&mut wants);
+        results::want_others(&mut wants);
+    }
     results::want_compared(&mut wants);
     results::want_thumbnails(&mut wants);
     results::want_doctor(&mut wants);
-    neighbors(&mut wants);
+    if let Some(pair) = pair {
+        neighbors(&mut wants, pair);
+    }
     results::want_mask_plan(&mut wants);
     results::want_import_plan(&mut wants);
     results::want_train_plan(&mut wants);
     wants.list
 }
 
-fn selection(wants: &mut Demands<'_>) {
-    let state = wants.state;
-    let Some(pair) = state.pair_key() else { return };
-    if !state.shows_pair() {
-        return;
-    }
-    wants.ask(pair);
-    let name = state.pair_name();
-    wants.ask_unless(state.document.stored.contains_key(name), LabelsKey(pair));
-    let (measured, predicted) = (ImprintSource::Measured, ImprintSource::Predicted);
-    let (scene_measured, cloud_measured) = results::shows_cloud(state, measured);
-    let (scene_predicted, cloud_predicted) = results::shows_cloud(state, predicted);
-
-    let shown = state.fingers();
-    for finger in state.rig().pads() {
-        let on_screen = shown.contains(&finger);
-        let image = state.needs(Demand::Imprint(predicted)) && on_screen;
-        let compared = state.needs(Demand::Comparison) && on_screen;
-        if image || compared || cloud_predicted {
-            results::want_stored(wants, finger, pair.finger(finger));
-            results::want_imprint(wants, finger, pair.finger(finger));
-        }
-        if cloud_predicted {
-            results::want_other_finger(wants, finger);
-        }
-        if compared {
-            results::want_comparison(wants, finger, pair.finger(finger));
-        }
-    }
-    let drawn = state.settings.mask_visible || state.needs(Demand::Masks);
-    for (cloud, pose, source) in
-        [(cloud_measured, scene_measured, measured), (cloud_predicted, scene_predicted, predicted)]
-    {
-        let seen = drawn && state.needs(Demand::Imprint(source));
-        results::want_side(wants, source, [cloud, pose], |finger| seen && shown.contains(&finger));
-        if pose && state.document.stroke.is_none() {
-            workbench(wants, source);
-        }
-    }
-    let posable =
-        || results::tool(state).ready().is_some() && results::cloud(state, state.inspect.source).ready().is_some();
-    if state.document.stroke.is_none() && posable() {
-        results::want_inspection(wants);
-    }
-    results::want_proposal(wants);
-    results::want_predictions_ahead(wants);
-    results::want_others(wants);
-}
-
-/// Asks for what the workbench shows of an imprint whose cloud is needed anyway.
-fn workbench(wants: &mut Demands<'_>, source: ImprintSource) {
-    let state = wants.state;
-    if results::tool(state).ready().is_none() || results::cloud(state, source).ready().is_none() {
-        return;
-    }
-    if let Some(run) = state.workbench.hand(source).and_then(|hand| hand.icp.clone()) {
-        wants.ask(run);
-    }
-    results::want_layers(wants, source);
-    results::want_deviation(wants, source);
-}
-
-fn neighbors(wants: &mut Demands<'_>) {
-    let state = wants.state;
-    let (Some(open), Some(selected)) = (state.library.open.as_ref(), state.selection.pair) else {
-        return;
-    };
-    if !state.shows_pair() {
-        return;
-    }
-    let Some(row) = state.library.row_of(selected) else {
-        return;
-    };
-    let order = &state.library.order;
+/// Asks for the pairs before and after the selected one.
+fn neighbors(wants: &mut Demands<'_>, selected: PairKey) {
+    let library = &wants.state.library;
+    let Some(row) = library.row_of(selected.pair) else { return };
     for distance in 1..=PREFETCH {
         for at in [row.checked_add(distance), row.checked_sub(distance)].into_iter().flatten() {
-            if let Some(pair) = order.get(at) {
-                wants.ask(open.key(*pair));
+            if let Some(pair) = library.order.get(at) {
+                wants.ask(PairKey { pair: *pair, ..selected });
             }
         }
     }

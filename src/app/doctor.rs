@@ -3,15 +3,15 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::effect::{Access, Effect, Task};
+use super::effect::{Access, Effect};
 use super::keys::{DatasetSeq, ImprintSource};
 use super::learn::{self, AdaptPairs, LearnCommand, Network};
 use super::library::{self, LibraryCommand};
+use super::recipe;
 use super::settings::{self, ColorRange, prefer};
-use super::source::Source;
 use super::state::State;
 use super::state::tasks::TaskKind;
-use super::{recipe, tasks};
+use super::tasks::{self, Start};
 use touch2touch_core::read_as::parse_list;
 use touch2touch_pipeline::doctor::{self, Cure, Examined, Worth};
 use touch2touch_pipeline::doubts;
@@ -20,7 +20,6 @@ use touch2touch_pipeline::io::doctor::MOST_PAIRS;
 use touch2touch_pipeline::job::JobCx;
 use touch2touch_pipeline::learn::train::MasksFrom;
 use touch2touch_pipeline::steps::bundles::BundleKind;
-use touch2touch_pipeline::steps::predict::Generating;
 use touch2touch_pipeline::steps::recipe::Recipe;
 
 /// A command to the panel.
@@ -43,8 +42,11 @@ pub(super) fn step(state: &mut State, command: DoctorCommand, effects: &mut Vec<
         DoctorCommand::Try => {
             let (Some(recipe), Some(open)) = (worth_recipe(state), &state.library.open) else { return };
             let source = open.source.clone();
-            let title = format!("Try the models on {}", source.dataset.title);
-            if tasks::start(state, title, TryModels { source, recipe }, effects).is_some() {
+            let start = Start::new(TaskKind::TryModels, format!("Try the models on {}", source.dataset.title));
+            let run = move |access: &Access, cx: &JobCx| {
+                Ok(doctor::worth(&source.dataset, &recipe, &access.services.models, cx)?.map(Arc::new))
+            };
+            if tasks::start(state, start, effects, run, tried).is_some() {
                 state.doctor.tried = true;
             }
         }
@@ -85,7 +87,12 @@ fn carry_out(state: &mut State, cure: Cure, effects: &mut Vec<Effect>) {
             let Some((seq, source)) = state.library.open.as_ref().map(|open| (open.seq, open.source.clone())) else {
                 return;
             };
-            tasks::start(state, TaskKind::ReadOtherwise.name(), ReadOtherwise { seq, source, list }, effects);
+            let what = TaskKind::ReadOtherwise.name();
+            let run = move |_: &Access, _: &JobCx| {
+                let read_as = parse_list(&list).map_err(|why| TaskError::new(what, why))?;
+                Ok((seq, doubts::read_otherwise(&source.dataset, &read_as)?, list))
+            };
+            tasks::start(state, Start::new(TaskKind::ReadOtherwise, what), effects, run, read_otherwise);
         }
         Cure::Fit { .. } => {
             state.learn.form.pairs = AdaptPairs::All;
@@ -97,25 +104,25 @@ fn carry_out(state: &mut State, cure: Cure, effects: &mut Vec<Effect>) {
         }
         Cure::Examine { .. } => {
             let Some(source) = state.library.open.as_ref().map(|open| open.source.clone()) else { return };
-            let task = Examine { source, recipe: tried_recipe(state) };
-            tasks::start(state, TaskKind::Examine.name(), task, effects);
+            let recipe = tried_recipe(state);
+            let run = move |access: &Access, cx: &JobCx| {
+                let generator = recipe.generating().ok().map(|generating| (&access.services.models, generating));
+                doctor::examined(&source.dataset, MOST_PAIRS, generator, cx).map(Arc::new)
+            };
+            tasks::start(state, Start::new(TaskKind::Examine, TaskKind::Examine.name()), effects, run, examined);
         }
     }
 }
 
 /// Has a network learn, where it can be seen.
 fn start_learning(state: &mut State, network: Network, effects: &mut Vec<Effect>) {
-    stop_trying(state, effects);
-    learn::step(state, LearnCommand::Start(network), effects);
-    learn::step(state, LearnCommand::Show(network), effects);
-    state.doctor.shown = false;
-}
-
-/// Ends the trial of the models: something else takes its place and must not wait for it.
-fn stop_trying(state: &mut State, effects: &mut Vec<Effect>) {
+    // The trial of the models must not be waited for.
     if let Some((ticket, _)) = state.tasks.of_kind(TaskKind::TryModels) {
         tasks::step(state, tasks::TasksCommand::Cancel(ticket), effects);
     }
+    learn::step(state, LearnCommand::Start(network), effects);
+    learn::step(state, LearnCommand::Show(network), effects);
+    state.doctor.shown = false;
 }
 
 /// The models that are tried: a generator as it was before it was fitted to anything.
@@ -152,72 +159,24 @@ pub(crate) fn fitted_in_use(state: &State) -> Option<&str> {
     now.is_fitted().then_some(now.name.as_str())
 }
 
-/// Tries the models on a sample.
-pub struct TryModels {
-    source: Arc<Source>,
-    recipe: Recipe,
+/// The models were tried.
+pub fn tried(worth: &Option<Arc<Worth>>, state: &mut State, _: &mut Vec<Effect>) {
+    state.doctor.worth = worth.clone();
 }
 
-impl Task for TryModels {
-    type End = Option<Arc<Worth>>;
-    const KIND: TaskKind = TaskKind::TryModels;
-
-    fn run(self, access: &Access, cx: &JobCx) -> Result<Self::End, TaskError> {
-        Ok(doctor::worth(&self.source.dataset, &self.recipe, &access.services.models, cx)?.map(Arc::new))
-    }
-
-    fn ended(worth: &Self::End, state: &mut State, _: &mut Vec<Effect>) {
-        state.doctor.worth = worth.clone();
-    }
+/// Every pair was examined.
+pub fn examined(examined: &Arc<Examined>, state: &mut State, _: &mut Vec<Effect>) {
+    state.doctor.examined = Some(examined.clone());
 }
 
-/// Examines every pair.
-pub struct Examine {
-    source: Arc<Source>,
-    recipe: Recipe,
-}
-
-impl Task for Examine {
-    type End = Arc<Examined>;
-    const KIND: TaskKind = TaskKind::Examine;
-
-    fn run(self, access: &Access, cx: &JobCx) -> Result<Self::End, TaskError> {
-        let generating = self.recipe.generating().ok();
-        let generator = generating.map(|generating: Generating<'_>| (&access.services.models, generating));
-        doctor::examined(&self.source.dataset, MOST_PAIRS, generator, cx).map(Arc::new)
-    }
-
-    fn ended(examined: &Self::End, state: &mut State, _: &mut Vec<Effect>) {
-        state.doctor.examined = Some(examined.clone());
-    }
-}
-
-/// Has the data set read otherwise than it is stored, and opens it again.
-pub struct ReadOtherwise {
-    seq: DatasetSeq,
-    source: Arc<Source>,
-    list: String,
-}
-
-impl Task for ReadOtherwise {
-    /// The data set that it is of, the file that says so, and what it says.
-    type End = (DatasetSeq, PathBuf, String);
-    const KIND: TaskKind = TaskKind::ReadOtherwise;
-
-    fn run(self, _: &Access, _: &JobCx) -> Result<Self::End, TaskError> {
-        let what = Self::KIND.name();
-        let read_as = parse_list(&self.list).map_err(|why| TaskError::new(what, why))?;
-        Ok((self.seq, doubts::read_otherwise(&self.source.dataset, &read_as)?, self.list))
-    }
-
-    fn ended((seq, file, list): &Self::End, state: &mut State, effects: &mut Vec<Effect>) {
-        let text = match list.as_str() {
-            "" => "The data are read as stored".to_owned(),
-            list => format!("The data are read with {list}"),
-        };
-        state.log.saved(text, file.clone());
-        if state.library.is_open(*seq) {
-            library::step(state, LibraryCommand::Reload, effects);
-        }
+/// A data set is read otherwise than it is stored: a file of it says so, and what that says.
+pub fn read_otherwise((seq, file, list): &(DatasetSeq, PathBuf, String), state: &mut State, effects: &mut Vec<Effect>) {
+    let text = match list.as_str() {
+        "" => "The data are read as stored".to_owned(),
+        list => format!("The data are read with {list}"),
+    };
+    state.log.saved(text, file.clone());
+    if state.library.is_open(*seq) {
+        library::step(state, LibraryCommand::Reload, effects);
     }
 }

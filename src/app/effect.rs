@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::jobs::Worker;
 use super::keys::{DatasetSeq, Revision};
-use super::results::preview::Onlooker;
+use super::results::prediction::Onlooker;
 use super::services::Services;
 use super::source::Source;
 use super::state::State;
@@ -51,55 +51,20 @@ pub struct Access {
     pub onlooker: Onlooker,
 }
 
-/// A job that a person starts, with all that it needs. `tasks::start` lists it; the rest follows.
-pub trait Task: Send + 'static {
-    /// The value that it ends with.
-    type End: Send + Sync + 'static;
+/// The work of a job.
+type Run = Box<dyn FnOnce(&Access, &JobCx) -> Result<TaskResult, TaskError> + Send>;
 
-    /// The row among what can be started.
-    const KIND: TaskKind;
-
-    /// The work that it does, for errors.
-    fn what(&self) -> String {
-        Self::KIND.name().to_owned()
-    }
-
-    /// The worker that it runs on.
-    fn worker(&self) -> Worker {
-        Self::KIND.worker()
-    }
-
-    /// Does it.
-    ///
-    /// # Errors
-    /// If it cannot be done, or was told to stop.
-    fn run(self, access: &Access, cx: &JobCx) -> Result<Self::End, TaskError>;
-
-    /// The consequences of its end.
-    fn ended(end: &Self::End, state: &mut State, effects: &mut Vec<Effect>);
-}
-
-/// The body of a task.
-type Doing = Box<dyn FnOnce(&Access, &JobCx) -> Result<TaskResult, TaskError> + Send>;
-/// The consequences of its end.
+/// The consequences of the end of a task.
 type Follows = Arc<dyn Fn(&mut State, &mut Vec<Effect>) + Send + Sync>;
 
-/// A task on its way to its worker.
+/// A job that a person started, with all that it needs, on its way to its worker.
 pub struct TaskJob {
     /// The work that it does, for errors.
     pub what: String,
     /// The worker that it runs on.
     pub worker: Worker,
     /// The way.
-    pub body: Doing,
-}
-
-impl TaskJob {
-    /// A task of any kind.
-    pub(super) fn new<E: Task>(task: E) -> Self {
-        let (what, worker) = (task.what(), task.worker());
-        Self { what, worker, body: Box::new(|access, cx| Ok(TaskResult::of::<E>(task.run(access, cx)?))) }
-    }
+    pub body: Run,
 }
 
 /// The end of a task.
@@ -111,9 +76,13 @@ pub struct TaskResult {
 }
 
 impl TaskResult {
-    /// With what follows from it.
-    pub fn of<E: Task>(end: E::End) -> Self {
-        Self { kind: E::KIND, follows: Arc::new(move |state, effects| E::ended(&end, state, effects)) }
+    /// A value that it ended with, and what follows from it.
+    pub fn new<E: Send + Sync + 'static>(
+        kind: TaskKind,
+        end: E,
+        ended: impl Fn(&E, &mut State, &mut Vec<Effect>) + Send + Sync + 'static,
+    ) -> Self {
+        Self { kind, follows: Arc::new(move |state, effects| ended(&end, state, effects)) }
     }
 
     /// Lets that follow.

@@ -1,29 +1,36 @@
 //! The room of what is taken away: pictures in 3D, pairs for other programs, masks.
 
 mod command;
-mod setup;
 
-pub use super::keys::ImportForm;
-pub use super::state::export::{Output, StillAsked};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
 pub use command::{equivalent, equivalent_words};
-pub use setup::{PairExport, pair_export};
-pub(crate) use setup::{can_draw, still_setup};
 
-use std::path::PathBuf;
-
-use super::effect::Effect;
+use super::effect::{Access, Effect};
 use super::jobs::Worker;
-use super::labels::ImportMasks;
+pub use super::keys::ImportForm;
+use super::keys::{ImprintSource, Registration};
 use super::results;
 use super::state::State;
-use super::state::tasks::TaskKind;
-use super::state::view::UiRequest;
-use super::tasks::{self, Write};
+pub use super::state::export::{Output, StillAsked};
+use super::state::tasks::{Level, TaskKind};
+use super::state::view::{Purpose, UiRequest};
+use super::state::workbench::Layer;
+use super::tasks::{self, Start};
 use crate::spatial;
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::rig::Rig;
 use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::export::import::{Import, ImportSetup, import_masks};
+use touch2touch_pipeline::export::pair_files::{self, PairParts};
 use touch2touch_pipeline::export::{DrawnMasks, ExportChoice, ExportSetup, export_masks};
+use touch2touch_pipeline::job::JobCx;
 use touch2touch_pipeline::labels::Labels;
-use touch2touch_pipeline::still::still;
+use touch2touch_pipeline::steps::estimate::Estimate;
+use touch2touch_pipeline::steps::prediction::predicted_by;
+use touch2touch_pipeline::steps::tool::NamedTool;
+use touch2touch_pipeline::still::{StillSetup, still};
 
 /// A command to what is taken away.
 #[derive(Clone, Debug)]
@@ -63,7 +70,7 @@ pub(super) fn step(state: &mut State, command: ExportCommand, effects: &mut Vec<
             }
         }
         ExportCommand::Import => import(state, effects),
-        ExportCommand::Place(output) => effects.push(Effect::Ui(UiRequest::PickOutput(output))),
+        ExportCommand::Place(output) => effects.push(Effect::Ui(UiRequest::Pick(Purpose::Output(output)))),
         ExportCommand::Write(output, file) => write(state, output, file, effects),
     }
 }
@@ -75,7 +82,11 @@ fn import(state: &mut State, effects: &mut Vec<Effect>) {
     }
     let source = open.source.clone();
     state.export.importing = None;
-    tasks::start(state, TaskKind::Import.name(), ImportMasks { source, setup }, effects);
+    let run = move |_: &Access, cx: &JobCx| {
+        let from = std::path::absolute(&setup.from).unwrap_or_else(|_| setup.from.clone());
+        import_masks(&source.dataset, &ImportSetup { from, ..setup }, cx)
+    };
+    tasks::start(state, Start::new(TaskKind::Import, TaskKind::Import.name()), effects, run, imported);
 }
 
 fn write(state: &mut State, output: Output, file: PathBuf, effects: &mut Vec<Effect>) {
@@ -84,40 +95,145 @@ fn write(state: &mut State, output: Output, file: PathBuf, effects: &mut Vec<Eff
             let Some(source) = state.library.open.as_ref().map(|open| open.source.clone()) else { return };
             state.export.asking_masks = false;
             let (labels, choice) = (state.document.finished_labels(), state.export.masks);
-            let write = Write::new(Worker::Compute, "Export masks", file, move |folder, _, cx| {
+            let job = (Worker::Compute, "Export masks", "Export masks");
+            tasks::write(state, job, file, effects, move |folder, _, cx| {
                 let setup = ExportSetup { pairs: None, choice };
                 let masks = DrawnMasks { labels: &Labels::of(&source.dataset), changed: &labels };
                 let (plan, _) = export_masks(&source.dataset, &masks, &setup, &folder, None, cx)?;
                 Ok((format!("Exported to {}: {}", folder.display(), plan.lines().join("; ")), folder))
             });
-            tasks::start(state, "Export masks", write, effects);
         }
         Output::Pair(source) => {
             let Some(pair) = pair_export(state, source) else {
                 let err = TaskError::new("Export the pair", format!("it has no {} points", source.key()));
                 return state.log.error(&err.with_hint("Show it in 3D first."));
             };
-            let write = Write::new(Worker::Compute, "Export the pair", file, move |folder, _, _| {
+            let job = (Worker::Compute, "Export the pair", "Export the pair");
+            tasks::write(state, job, file, effects, move |folder, _, _| {
                 let files = pair.write(&folder)?;
                 let names = files.iter().filter_map(|file| file.file_name()).map(|name| name.to_string_lossy());
                 let text = format!("Saved {}", names.collect::<Vec<_>>().join(", "));
                 Ok((text, files.into_iter().next().unwrap_or_default()))
             });
-            tasks::start(state, "Export the pair", write, effects);
         }
         Output::Still(asked) => {
             let Some((setup, open)) = still_setup(state, asked).zip(state.library.open.as_ref()) else { return };
             let source = open.source.clone();
             let png = asked.turntable.is_none() && file.extension().is_none();
             let file = if png { file.with_extension("png") } else { file };
-            let write = Write::new(Worker::Models, "Still", file, move |file, access, cx| {
+            let job = (Worker::Models, "Still", "Draw the still");
+            tasks::write(state, job, file, effects, move |file, access, cx| {
                 let drawer = spatial::stills()?;
                 let done = still(&source.dataset, &setup, &access.services.models, drawer, &file, cx)?;
                 let ([width, height], count) = (done.size_px, done.files.len());
                 let frames = if count == 1 { String::new() } else { format!("{count} frames of ") };
                 Ok((format!("Saved {} ({frames}{width} x {height} pixels)", file.display()), file))
             });
-            tasks::start(state, "Draw the still", write, effects);
         }
+    }
+}
+
+/// The export of the selected pair for other programs, gathered for a job.
+#[derive(Clone, Debug)]
+pub struct PairExport {
+    name: String,
+    source: ImprintSource,
+    prediction: Option<String>,
+    rig: Arc<Rig>,
+    estimate: Arc<Estimate>,
+    registration: Registration,
+    /// True where it has a pose.
+    posed: bool,
+    truth: Option<PlanarPose>,
+    tool: Option<Arc<NamedTool>>,
+}
+
+impl PairExport {
+    /// Writes the files that there can be: without a pose only the cloud.
+    ///
+    /// # Errors
+    /// As [`pair_files::write`].
+    pub fn write(&self, folder: &Path) -> Result<Vec<PathBuf>, TaskError> {
+        let parts = PairParts {
+            name: &self.name,
+            source: self.source,
+            prediction: self.prediction.as_deref(),
+            rig: &self.rig,
+            clouds: self.estimate.surface(),
+            mask: &self.estimate.contact().made_of(),
+            registration: self.registration,
+            pose: if self.posed { self.estimate.pose().ok() } else { None },
+            truth: self.truth,
+            tool: self.tool.as_ref().map(|tool| (tool.name.as_str(), &tool.model)),
+        };
+        pair_files::write(&parts, folder)
+    }
+}
+
+/// A picture of the selected pair in 3D, by the recipe of what is shown, in the colors of distances where these are on.
+pub(crate) fn still_setup(state: &State, asked: StillAsked) -> Option<StillSetup> {
+    let reach = state.settings.scene.distance_m;
+    Some(StillSetup {
+        pair: state.selection.pair?,
+        pane: asked.pane,
+        recipe: command::recipe_shown(state, *asked.pane.sides().last()?),
+        labels: state.document.pair(state.pair_name()).cloned().unwrap_or_default(),
+        ground: asked.ground,
+        angles: asked.angles,
+        width_px: asked.width_px,
+        turntable: asked.turntable,
+        distance_m: (state.workbench.layer == Layer::Distance).then_some(reach.into()),
+    })
+}
+
+/// The export of the selected pair; `None` while its cloud is not there.
+pub fn pair_export(state: &State, source: ImprintSource) -> Option<PairExport> {
+    let cloud = results::cloud_key(state, source).ok()??;
+    let posed = results::pose_key(state, source).ok().flatten();
+    let posed = posed.filter(|key| results::pose_of(state, key).is_some());
+    let recipe =
+        state.rig().pads().find_map(|pad| results::chosen(state, pad)).filter(|_| source == ImprintSource::Predicted);
+    let prediction =
+        recipe.map(|made| predicted_by(state.library.model_name(&made.bundle), &made.config, state.settings.shift));
+    Some(PairExport {
+        name: state.pair_name().to_owned(),
+        source,
+        prediction,
+        rig: state.rig(),
+        posed: posed.is_some(),
+        estimate: state.results.estimates.get(&posed.unwrap_or(cloud))?.clone(),
+        registration: state.settings.registration,
+        truth: results::sample(state).ready()?.grasp_from_object,
+        tool: results::tool_key(state).ok().and_then(|key| state.results.tools.get(&key)).cloned(),
+    })
+}
+
+/// True where the selected pair can be drawn in 3D.
+pub(crate) fn can_draw(state: &State) -> bool {
+    state.entry().is_some()
+}
+
+/// Masks were taken over.
+pub fn imported(import: &Import, state: &mut State, _: &mut Vec<Effect>) {
+    reread(state, &import.changed);
+    let level = if import.complete { Level::Info } else { Level::Warning };
+    state.log.push(level, import.text(), None, None);
+    if import.total() > 0 {
+        state.log.place_last(import.labels.clone());
+    }
+}
+
+/// Has labels that were changed on the disk read again. What was done to them is in their journals, so that undo takes it
+/// back too.
+fn reread(state: &mut State, names: &[String]) {
+    for name in names {
+        let doc = &mut state.document;
+        let drawn_on = doc.stroke.as_ref().is_some_and(|stroke| stroke.pair == *name);
+        // What is on its way to the disk is merged there, and comes back merged.
+        if drawn_on || doc.unsaved.contains(name) {
+            continue;
+        }
+        doc.reread(name);
+        state.history.forget(name);
     }
 }

@@ -1,7 +1,7 @@
 //! The room of the steps of a registration: moving about in what was recorded.
 
-pub use super::state::inspect::Inspect;
 pub(crate) use super::state::inspect::Inspected;
+pub use super::state::inspect::{Inspect, Inspection};
 
 use super::effect::Effect;
 use super::keys::ImprintSource;
@@ -27,12 +27,15 @@ pub enum InspectCommand {
     },
     /// Moves by so many steps; stops at the ends.
     By(i64),
-    /// Shows the applied start.
-    Begin,
-    /// Shows the last step.
-    End,
     /// Lets the steps go by, or stops them. At the end it begins again.
     Play(bool),
+}
+
+impl InspectCommand {
+    /// Shows the applied start.
+    pub const BEGIN: Self = Self::By(i64::MIN);
+    /// Shows the last step.
+    pub const END: Self = Self::By(i64::MAX);
 }
 
 pub(super) fn step(state: &mut State, command: InspectCommand, _: &mut Vec<Effect>) {
@@ -67,14 +70,6 @@ pub(super) fn step(state: &mut State, command: InspectCommand, _: &mut Vec<Effec
             if state.inspect.at.is_none() || by < 0 {
                 state.inspect.playing = false;
             }
-        }
-        InspectCommand::Begin => {
-            state.inspect.playing = false;
-            go(state, 0);
-        }
-        InspectCommand::End => {
-            state.inspect.playing = false;
-            state.inspect.at = None;
         }
         InspectCommand::Play(play) => {
             let Some((last, steps)) = results::inspected(state).map(|s| (s.is_last(), s.inspection.num_steps(s.run)))

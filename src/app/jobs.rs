@@ -3,28 +3,18 @@
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::job::JobCx;
 
-/// A worker, on which jobs run. Each has its own threads, so that none waits for another kind of work.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, strum::EnumIter)]
-pub enum Worker {
-    /// Reading and writing files: one thread, in order.
-    Files,
-    /// Computing.
-    Compute,
-    /// Running models: one thread, which keeps them loaded.
-    Models,
-    /// Work that takes minutes and must not hold up anything else: one thread.
-    Batch,
-}
-
-impl Worker {
-    /// The name of its threads.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Files => "files",
-            Self::Compute => "compute",
-            Self::Models => "models",
-            Self::Batch => "batch",
-        }
+with_texts! {
+    /// A worker, on which jobs run. Each has its own threads, so that none waits for another kind of work.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, strum::EnumIter)]
+    pub enum Worker(name) {
+        /// Reading and writing files: one thread, in order.
+        Files = "files",
+        /// Computing.
+        Compute = "compute",
+        /// Running models: one thread, which keeps them loaded.
+        Models = "models",
+        /// Work that takes minutes and must not hold up anything else: one thread.
+        Batch = "batch",
     }
 }
 

@@ -1,20 +1,17 @@
 //! The room of the document: strokes, clean-ups, review states, accepted poses, undo, saving.
 
-mod import;
 pub(super) mod unsaved;
-
-pub(crate) use super::state::labels::{Changed, Merged};
-pub use super::state::labels::{Document, DrawnMask, MaskPlace, PairLabels, Question, Review, Stored, Stroke};
-pub use import::ImportMasks;
-pub use unsaved::{UnsavedCommand, unsaved};
 
 use std::borrow::Cow;
 
 use glam::DVec3;
+pub use unsaved::{UnsavedCommand, unsaved};
 
 use super::effect::{Effect, LabelsToSave};
 use super::keys::{EstimateKey, ImprintSource, Revision};
-use super::state::history::Gesture;
+use super::state::history::{Gesture, History};
+pub(crate) use super::state::labels::{Changed, Merged};
+pub use super::state::labels::{Document, DrawnMask, MaskPlace, PairLabels, Question, Review, Stored, Stroke};
 use super::state::tasks::Level;
 use super::state::{Lookup, State};
 use super::{results, settings};
@@ -109,14 +106,13 @@ pub(super) fn step(state: &mut State, command: LabelsCommand, effects: &mut Vec<
         LabelsCommand::Corner(at_px) => corner(state, at_px),
         // The journal could not hold a size that is no number, and the change could not be undone.
         LabelsCommand::CleanUp(clean_up) if !clean_up.size_mm.is_finite() => {}
-        LabelsCommand::CleanUp(clean_up) => {
-            clean(state, clean_up, effects);
-        }
+        LabelsCommand::CleanUp(clean_up) => clean(state, clean_up, effects),
         LabelsCommand::AdoptAutomatic => adopt_automatic(state, effects),
         LabelsCommand::AcceptProposal => accept_proposal(state, effects),
         LabelsCommand::ResetMask => reset(state, effects),
         LabelsCommand::Undo => undo(state, effects),
-        LabelsCommand::Redo => redo(state, effects),
+        LabelsCommand::Redo if state.document.stroke.is_some() => {}
+        LabelsCommand::Redo => travel(state, Act::Redo, effects),
         LabelsCommand::SetReview(review) => {
             set_review(state, review, effects);
             state.reorder();
@@ -155,23 +151,34 @@ pub(super) fn check_editable(state: &mut State, what: &str) -> bool {
     false
 }
 
+/// The automatic mask of an imprint as a hand takes it up, where it is there.
+fn automatic(state: &State, source: ImprintSource, finger: PadId) -> Option<DrawnMask> {
+    let (mask, recipe) = (results::automatic_mask(state, source, finger), results::mask_recipe(state, finger).ok()?);
+    Some(DrawnMask::new(mask.ready()?.clone(), results::automatic_provenance(state, source, finger, &recipe)))
+}
+
 /// The mask in force as a hand takes it up; an empty one where none can be had.
 ///
 /// `None` while it is being computed: a correction must not start from something else than what is shown.
 fn start_from(state: &State, source: ImprintSource, finger: PadId) -> Option<DrawnMask> {
-    if let Some(hand) = results::drawn_mask(state, source, finger) {
-        return Some(hand.clone());
+    let there = results::drawn_mask(state, source, finger).cloned();
+    if let Some(mask) = there.or_else(|| automatic(state, source, finger)) {
+        return Some(mask);
     }
     match (results::automatic_mask(state, source, finger), results::mask_recipe(state, finger)) {
-        (Lookup::Ready(mask), Ok(recipe)) => {
-            Some(DrawnMask::new(mask.clone(), results::automatic_provenance(state, source, finger, &recipe)))
-        }
         (Lookup::Waiting | Lookup::Stale(_), Ok(_)) => None,
         _ => {
             let [width, height] = results::imprint(state, source, finger).ready()?.size();
             Some(DrawnMask::new(Mask::filled(width, height, false), Provenance::Nothing))
         }
     }
+}
+
+/// The mask that clean-ups work on: its finger, imprint and place.
+fn worked_on(state: &State) -> Option<(PadId, ImprintSource, MaskPlace)> {
+    let finger = state.selection.finger;
+    let source = results::worked_on(state, finger);
+    Some((finger, source, results::mask_place(state, source, finger)?))
 }
 
 /// Begins a stroke, on the image or (with a picture and the point at whose depth a brush has its size) in 3D.
@@ -351,26 +358,23 @@ fn clean(state: &mut State, clean_up: CleanUp, effects: &mut Vec<Effect>) {
     if !check_editable(state, what) {
         return;
     }
-    let finger = state.selection.finger;
-    let source = results::worked_on(state, finger);
-    let (Some(mask), Some(place)) = (start_from(state, source, finger), results::mask_place(state, source, finger))
-    else {
+    let found = worked_on(state).and_then(|(finger, source, place)| Some((start_from(state, source, finger)?, place)));
+    let Some((mask, place)) = found else {
         return state.log.error(&TaskError::new(what, "there is no mask to work on yet"));
     };
     let (rig, on) = (state.rig(), TakenUp { place: place.clone(), mask });
-    if !change_mask(state, &place, LabelEdit::CleanUp { on, clean_up, rig: &rig }, effects) {
-        state.log.info(format!("{what}: nothing to change"));
-    }
+    change_mask(state, what, &place, LabelEdit::CleanUp { on, clean_up, rig: &rig }, effects);
 }
 
 /// Does something to the mask of an imprint of the selected pair.
-fn change_mask(state: &mut State, place: &MaskPlace, edit: LabelEdit<'_>, effects: &mut Vec<Effect>) -> bool {
+fn change_mask(state: &mut State, what: &str, place: &MaskPlace, edit: LabelEdit<'_>, effects: &mut Vec<Effect>) {
     let pair = state.pair_name().to_owned();
     let (source, revision) = (place.of.source(), state.document.next_revision());
     let before = shown_pose_key(state, source);
-    let Some(name) = change(state, &pair, edit, Some(revision), effects) else { return false };
+    let Some(name) = change(state, &pair, edit, Some(revision), effects) else {
+        return state.log.info(format!("{what}: nothing to change"));
+    };
     state.document.changed = Some(Changed { pair, source, name, before });
-    true
 }
 
 fn adopt_automatic(state: &mut State, effects: &mut Vec<Effect>) {
@@ -379,16 +383,12 @@ fn adopt_automatic(state: &mut State, effects: &mut Vec<Effect>) {
     if !check_editable(state, WHAT) {
         return;
     }
-    let finger = state.selection.finger;
-    let source = results::worked_on(state, finger);
-    let Some(place) = results::mask_place(state, source, finger) else { return };
+    let Some((finger, source, place)) = worked_on(state) else { return };
+    if let Some(mask) = automatic(state, source, finger) {
+        let adopt = LabelEdit::Adopt(TakenUp { place: place.clone(), mask });
+        return change_mask(state, WHAT, &place, adopt, effects);
+    }
     match (results::automatic_mask(state, source, finger), results::mask_recipe(state, finger)) {
-        (Lookup::Ready(mask), Ok(recipe)) => {
-            let mask = DrawnMask::new(mask.clone(), results::automatic_provenance(state, source, finger, &recipe));
-            if !change_mask(state, &place, LabelEdit::Adopt(TakenUp { place: place.clone(), mask }), effects) {
-                state.log.info(format!("{WHAT}: nothing to change"));
-            }
-        }
         (Lookup::Failed(err), _) => {
             let err = err.clone();
             state.log.error(&err);
@@ -405,9 +405,7 @@ fn accept_proposal(state: &mut State, effects: &mut Vec<Effect>) {
     if !results::proposes(state) || !check_editable(state, WHAT) {
         return;
     }
-    let finger = state.selection.finger;
-    let source = results::worked_on(state, finger);
-    let Some(place) = results::mask_place(state, source, finger) else { return };
+    let Some((finger, source, place)) = worked_on(state) else { return };
     let proposal = match results::proposal(state, source, finger) {
         Lookup::Ready(proposal) => proposal.clone(),
         Lookup::Failed(err) => {
@@ -423,18 +421,15 @@ fn accept_proposal(state: &mut State, effects: &mut Vec<Effect>) {
     state.selection.proposing = false;
     let over_drawn = state.settings.mask.over_drawn;
     let accept = LabelEdit::AcceptProposal { place: place.clone(), proposal: &proposal, over_drawn };
-    if !change_mask(state, &place, accept, effects) {
-        state.log.info(format!("{WHAT}: nothing to change"));
-    }
+    change_mask(state, WHAT, &place, accept, effects);
 }
 
 fn reset(state: &mut State, effects: &mut Vec<Effect>) {
+    const WHAT: &str = "Back to the automatic mask";
     end_stroke(state, effects);
-    let finger = state.selection.finger;
-    let source = results::worked_on(state, finger);
-    let Some(place) = results::mask_place(state, source, finger) else { return };
-    if results::drawn_mask(state, source, finger).is_some() && check_editable(state, "Back to the automatic mask") {
-        change_mask(state, &place, LabelEdit::Remove(place.clone()), effects);
+    let Some((finger, source, place)) = worked_on(state) else { return };
+    if results::drawn_mask(state, source, finger).is_some() && check_editable(state, WHAT) {
+        change_mask(state, WHAT, &place, LabelEdit::Remove(place.clone()), effects);
     }
 }
 
@@ -473,10 +468,8 @@ fn right_as_they_are(state: &State) -> Vec<TakenUp> {
         if results::drawn_mask(state, source, finger).is_some() {
             return None;
         }
-        let mask = results::automatic_mask(state, source, finger).ready()?;
-        let recipe = results::mask_recipe(state, finger).ok()?;
-        let from = results::automatic_provenance(state, source, finger, &recipe);
-        Some(TakenUp { place: results::mask_place(state, source, finger)?, mask: DrawnMask::new(mask.clone(), from) })
+        let mask = automatic(state, source, finger)?;
+        Some(TakenUp { place: results::mask_place(state, source, finger)?, mask })
     };
     state.fingers().into_iter().filter_map(of).collect()
 }
@@ -524,28 +517,21 @@ fn undo(state: &mut State, effects: &mut Vec<Effect>) {
         }
         return cancel_stroke(state);
     }
-    let (pair, shown) = (state.pair_name().to_owned(), results::mask_places(state));
-    let name = state.history.undo(&mut state.document, &pair, &shown).map(|gesture| gesture.name.clone());
-    travelled(state, Act::Undo, &pair, name, effects);
+    travel(state, Act::Undo, effects);
 }
 
-fn redo(state: &mut State, effects: &mut Vec<Effect>) {
-    if state.document.stroke.is_some() {
-        return;
-    }
+/// Takes the last change of what is on screen back, or does it again.
+fn travel(state: &mut State, act: Act, effects: &mut Vec<Effect>) {
     let (pair, shown) = (state.pair_name().to_owned(), results::mask_places(state));
-    let name = state.history.redo(&mut state.document, &pair, &shown).map(|gesture| gesture.name.clone());
-    travelled(state, Act::Redo, &pair, name, effects);
-}
-
-fn travelled(state: &mut State, act: Act, pair: &str, name: Option<Cow<'static, str>>, effects: &mut Vec<Effect>) {
+    let go = if act == Act::Undo { History::undo } else { History::redo };
+    let name = go(&mut state.history, &mut state.document, &pair, &shown).map(|gesture| gesture.name.clone());
     let how = if act == Act::Undo { "Undone" } else { "Redone" };
     match name {
         Some(name) => {
             // What the last change did is said no more: it may be what was taken back.
             state.document.changed = None;
             state.log.info(format!("{how}: {name}"));
-            save_pair(state, pair, Operation { act, ..Operation::named(name) }, effects);
+            save_pair(state, &pair, Operation { act, ..Operation::named(name) }, effects);
             state.reorder();
         }
         None => state.log.info(format!("{how}: nothing on screen to change")),

@@ -3,21 +3,19 @@
 pub use super::state::learn::{AdaptPairs, LearnForm, Network};
 pub(crate) use super::state::learn::{MINUTES, MOST_HELD_OUT, STEPS, TUNING_STEPS};
 
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::effect::{Access, Effect, Task};
+use super::effect::{Access, Effect};
 use super::keys::ImprintSource;
 use super::pane::Pane;
 use super::settings::{self, prefer};
-use super::source::Source;
 use super::state::State;
-use super::state::labels::PairLabels;
 use super::state::learn::FOLDS;
 use super::state::tasks::{Level, TaskKind};
 use super::state::view::UiRequest;
-use super::{predict, recipe, results, tasks};
+use super::tasks::{self, Start};
+use super::{predict, recipe, results};
 use touch2touch_core::dataset::PairId;
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::export::DrawnMasks;
@@ -57,26 +55,48 @@ pub(super) fn step(state: &mut State, command: LearnCommand, effects: &mut Vec<E
             state.learn.stopped = [None, None];
         }
         LearnCommand::Start(network) => {
-            let Some(source) = state.library.open.as_ref().map(|open| open.source.clone()) else { return };
-            let (title, learn) = match network {
+            let Some(dataset) = state.library.open.as_ref().map(|open| open.source.dataset.clone()) else { return };
+            let started = match network {
                 Network::Generator => {
                     let Some(setup) = adapt_setup(state) else { return };
-                    (format!("Fit to {}", source.dataset.title), Learn::Fit { source, setup: Box::new(setup) })
+                    let title = format!("Fit to {}", dataset.title);
+                    let run = move |access: &Access, cx: &JobCx| {
+                        let (services, unfinished) = (&access.services, access.services.unfinished.clone());
+                        // Among the models that the program looks for at its start.
+                        let name = format!("fitted-to-{}", names::label(&dataset.title));
+                        let out = services.models_folder.as_ref().map(|folder| folder.join(name));
+                        let setup = AdaptSetup { out, unfinished, ..setup };
+                        Learned::fit(adapt::adapt(&dataset, &setup, &services.models, cx)?)
+                    };
+                    tasks::start(state, start(title, network.what()), effects, run, learned)
                 }
                 Network::Masks => {
                     let Some(setup) = train_setup(state) else { return };
                     let changed = state.document.labels.clone();
-                    (network.what().to_owned(), Learn::Train { source, changed, setup: Box::new(setup) })
+                    let run = move |access: &Access, cx: &JobCx| {
+                        let (services, unfinished) = (&access.services, access.services.unfinished.clone());
+                        let models = services.models_folder.as_deref().ok_or_else(|| {
+                            TaskError::new(network.what(), "this system names no folder for models")
+                                .with_hint("Train with touch2touch masks train --out FOLDER.")
+                        })?;
+                        let setup = TrainSetup { out: train::new_folder(models, &dataset), unfinished, ..setup };
+                        let masks = DrawnMasks { labels: &Labels::of(&dataset), changed: &changed };
+                        let trained = train::train(&dataset, &masks, &setup, &services.models, cx)?;
+                        let bundle = bundles::open("Open the trained bundle", trained.bundle.as_path())?;
+                        Ok(Learned::Masks(Arc::new(trained), bundle))
+                    };
+                    tasks::start(state, start(network.what(), network.what()), effects, run, learned)
                 }
             };
-            if tasks::start(state, title, learn, effects).is_some() {
+            if started.is_some() {
                 state.learn.started = network;
                 state.learn.stopped[network as usize] = None;
             }
         }
         LearnCommand::Keep => {
             let Some(adapted) = state.learn.refused().cloned() else { return };
-            tasks::start(state, "Keep the fit", Learn::Keep(adapted), effects);
+            let run = move |_: &Access, _: &JobCx| Learned::fit(adapt::keep(&adapted)?);
+            tasks::start(state, start("Keep the fit", "Keep the fit"), effects, run, learned);
         }
         LearnCommand::Use(network) => take_up(state, network, effects),
     }
@@ -99,29 +119,12 @@ fn take_up(state: &mut State, network: Network, effects: &mut Vec<Effect>) {
     }
 }
 
-/// Has a network learn, and keeps the new bundle where the program keeps models.
-pub enum Learn {
-    /// Fits a generator to pairs.
-    Fit {
-        /// The data.
-        source: Arc<Source>,
-        /// The generator and the pairs.
-        setup: Box<AdaptSetup>,
-    },
-    /// Only writes a fit that was refused.
-    Keep(Arc<Adapted>),
-    /// Trains a mask model.
-    Train {
-        /// The data.
-        source: Arc<Source>,
-        /// The labels of pairs, as far as they may not be on the disk yet.
-        changed: BTreeMap<String, PairLabels>,
-        /// The mask model and the time.
-        setup: Box<TrainSetup>,
-    },
+/// A network that learns, in these words.
+fn start(title: impl Into<String>, what: &str) -> Start {
+    Start { what: what.to_owned(), ..Start::new(TaskKind::Learn, title) }
 }
 
-/// End of a [`Learn`].
+/// What was learned.
 pub enum Learned {
     /// The fit, and its bundle where one was written.
     Generator(Arc<Adapted>, Option<BundleInfo>),
@@ -129,90 +132,50 @@ pub enum Learned {
     Masks(Arc<Trained>, BundleInfo),
 }
 
-impl Task for Learn {
-    type End = Learned;
-    const KIND: TaskKind = TaskKind::Learn;
-
-    fn what(&self) -> String {
-        match self {
-            Self::Fit { .. } => Network::Generator.what().to_owned(),
-            Self::Keep(_) => "Keep the fit".to_owned(),
-            Self::Train { .. } => Network::Masks.what().to_owned(),
-        }
-    }
-
-    fn run(self, access: &Access, cx: &JobCx) -> Result<Learned, TaskError> {
-        let services = &access.services;
-        let unfinished = services.unfinished.clone();
-        let adapted = match self {
-            Self::Train { source, changed, setup } => {
-                let dataset = &source.dataset;
-                let models = services.models_folder.as_deref().ok_or_else(|| {
-                    TaskError::new(Network::Masks.what(), "this system names no folder for models")
-                        .with_hint("Train with touch2touch masks train --out FOLDER.")
-                })?;
-                let setup = TrainSetup { out: train::new_folder(models, dataset), unfinished, ..*setup };
-                let trained = train::train(
-                    dataset,
-                    &DrawnMasks { labels: &Labels::of(dataset), changed: &changed },
-                    &setup,
-                    &services.models,
-                    cx,
-                )?;
-                let bundle = bundles::open("Open the trained bundle", trained.bundle.as_path())?;
-                return Ok(Learned::Masks(Arc::new(trained), bundle));
-            }
-            Self::Keep(adapted) => adapt::keep(&adapted)?,
-            Self::Fit { source, setup } => {
-                let dataset = &source.dataset;
-                // Among the models that the program looks for at its start.
-                let name = format!("fitted-to-{}", names::label(&dataset.title));
-                let out = services.models_folder.as_ref().map(|folder| folder.join(name));
-                adapt::adapt(dataset, &AdaptSetup { out, unfinished, ..*setup }, &services.models, cx)?
-            }
-        };
+impl Learned {
+    /// A fit, with its bundle.
+    fn fit(adapted: Adapted) -> Result<Self, TaskError> {
         let open = |folder| bundles::open("Open the fitted bundle", folder);
         let bundle = adapted.bundle.as_deref().map(open).transpose()?;
-        Ok(Learned::Generator(Arc::new(adapted), bundle))
-    }
-
-    /// Lists the bundle among the others. A trained mask model takes the place of the one in force, unless it is worse than that
-    /// on pairs that were left out.
-    fn ended(end: &Learned, state: &mut State, effects: &mut Vec<Effect>) {
-        match end {
-            Learned::Generator(adapted, bundle) => {
-                if let Some(bundle) = bundle {
-                    state.log.info(format!("Fitted: {} ({})", bundle.name, bundle.origin));
-                    add(state, Network::Generator, bundle);
-                }
-                for reason in adapted.refused() {
-                    state.log.push(Level::Warning, "The fit was not kept", Some(reason.to_owned()), None);
-                }
-                state.learn.adapted = Some(adapted.clone());
-                state.learn.stopped[Network::Generator as usize] = None;
-            }
-            Learned::Masks(trained, bundle) => {
-                let scores = match (trained.before, trained.after) {
-                    (Some(before), Some(after)) => {
-                        format!(", IoU {:.3} (was {:.3}) on other pairs", after.iou, before.iou)
-                    }
-                    _ => String::new(),
-                };
-                state.log.saved(format!("Trained: {}{scores}", bundle.name), trained.bundle.clone());
-                add(state, Network::Masks, bundle);
-                if trained.is_worse() {
-                    let hint = "Train longer or on more masks; \"Use the trained mask model\" uses it anyway.";
-                    let text = "The trained mask model is worse on other pairs and is not used";
-                    state.log.push(Level::Warning, text, None, Some(hint.into()));
-                } else {
-                    take_up(state, Network::Masks, effects);
-                }
-                state.learn.trained = Some(trained.clone());
-            }
-        }
+        Ok(Self::Generator(Arc::new(adapted), bundle))
     }
 }
 
+/// Lists the bundle among the others. A trained mask model takes the place of the one in force, unless it is worse than that
+/// on pairs that were left out.
+pub fn learned(end: &Learned, state: &mut State, effects: &mut Vec<Effect>) {
+    match end {
+        Learned::Generator(adapted, bundle) => {
+            if let Some(bundle) = bundle {
+                state.log.info(format!("Fitted: {} ({})", bundle.name, bundle.origin));
+                add(state, Network::Generator, bundle);
+            }
+            for reason in adapted.refused() {
+                state.log.push(Level::Warning, "The fit was not kept", Some(reason.to_owned()), None);
+            }
+            state.learn.adapted = Some(adapted.clone());
+            state.learn.stopped[Network::Generator as usize] = None;
+        }
+        Learned::Masks(trained, bundle) => {
+            let scores = match (trained.before, trained.after) {
+                (Some(before), Some(after)) => {
+                    format!(", IoU {:.3} (was {:.3}) on other pairs", after.iou, before.iou)
+                }
+                _ => String::new(),
+            };
+            state.log.saved(format!("Trained: {}{scores}", bundle.name), trained.bundle.clone());
+            add(state, Network::Masks, bundle);
+            if trained.is_worse() {
+                let hint = "Train longer or on more masks; \"Use the trained mask model\" uses it anyway.";
+                let text = "The trained mask model is worse on other pairs and is not used";
+                state.log.push(Level::Warning, text, None, Some(hint.into()));
+            } else {
+                take_up(state, Network::Masks, effects);
+            }
+            state.learn.trained = Some(trained.clone());
+        }
+    }
+}
 /// Adds a bundle to the list; one that was made again takes the place of the one before.
 fn add(state: &mut State, network: Network, bundle: &BundleInfo) {
     state.learn.bundles[network as usize] = Some(bundle.id.clone());

@@ -6,7 +6,7 @@ pub use super::state::library::{Follow, Library, Place, Sort, short_name};
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::effect::{Access, Effect, Task};
+use super::effect::{Access, Effect};
 use super::keys::DatasetSeq;
 use super::source::Source;
 use super::state::State;
@@ -16,7 +16,8 @@ use super::state::labels::{Document, Review};
 use super::state::results::{Request, Results};
 use super::state::settings::MAX_RECENT;
 use super::state::tasks::{Level, TaskKind};
-use super::{inspect, labels, settings, tasks};
+use super::tasks::{self, Start};
+use super::{inspect, labels, settings};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::PadId;
 use touch2touch_pipeline::error::TaskError;
@@ -83,33 +84,29 @@ pub(super) fn step(state: &mut State, command: LibraryCommand, effects: &mut Vec
         }
         LibraryCommand::ReadToolAs { tool, unit, replacing } => {
             if let Some((source, seq)) = state.library.open.as_ref().map(|open| (open.source.clone(), open.seq)) {
-                let task = ReadTool { seq, source, tool, unit, replacing };
-                tasks::start(state, task.what(), task, effects);
+                let title = format!("Read {tool} in {}", unit.name());
+                let start = Start { what: title.clone(), ..Start::new(TaskKind::ReadTool, title) };
+                let run = move |_: &Access, _: &JobCx| {
+                    Ok((seq, set_unit(&source.dataset, &tool, unit, replacing.as_deref())?))
+                };
+                tasks::start(state, start, effects, run, tool_read);
             }
         }
-        LibraryCommand::SetFilter(filter) => {
-            state.library.filter = filter;
-            state.reorder();
-        }
-        LibraryCommand::SetToolFilter(tool) => {
-            state.library.tool = tool;
-            state.reorder();
-        }
-        LibraryCommand::SetSort(sort) => {
-            state.library.sort = sort;
-            state.reorder();
-        }
-        LibraryCommand::SetScore(choice) => {
-            state.table.chosen = choice;
-            state.library.sort = Sort::Score;
-            state.reorder();
-        }
+        LibraryCommand::SetFilter(filter) => relist(state, |state| state.library.filter = filter),
+        LibraryCommand::SetToolFilter(tool) => relist(state, |state| state.library.tool = tool),
+        LibraryCommand::SetSort(sort) => relist(state, |state| state.library.sort = sort),
+        LibraryCommand::SetScore(choice) => relist(state, |state| {
+            (state.table.chosen, state.library.sort) = (choice, Sort::Score);
+        }),
         LibraryCommand::ShowRows(rows) => state.library.rows = rows,
         LibraryCommand::Select(pair) => select(state, pair, effects),
         LibraryCommand::Step(by) => step_by(state, by, effects),
         LibraryCommand::First => select_row(state, 0, effects),
         LibraryCommand::Last => select_row(state, usize::MAX, effects),
-        LibraryCommand::NextUnfinished => select_next_unfinished(state, effects),
+        LibraryCommand::NextUnfinished => {
+            let next = next_unfinished(state);
+            select_unfinished(state, next, effects);
+        }
         LibraryCommand::NextWorst => select_next_worst(state, effects),
         LibraryCommand::DoneAndNext if labels::says_open_polygon(state) => {}
         LibraryCommand::DoneAndNext => {
@@ -122,85 +119,52 @@ pub(super) fn step(state: &mut State, command: LibraryCommand, effects: &mut Vec
     }
 }
 
+/// Changes what the order of the list is made of.
+fn relist(state: &mut State, change: impl FnOnce(&mut State)) {
+    change(state);
+    state.reorder();
+}
+
 fn open(state: &mut State, place: Place, effects: &mut Vec<Effect>) {
     labels::end_stroke(state, effects);
     state.library.last_seq.0 += 1;
     let seq = state.library.last_seq;
     state.library.opening = Some(place.clone());
     state.library.failure = None;
-    let task = Open { seq, place };
-    if let Some(task) = tasks::start(state, task.what(), task, effects) {
+    let title = format!("Open {place}");
+    let start = Start { what: title.clone(), ..Start::new(TaskKind::Open, title) };
+    let run = move |access: &Access, _: &JobCx| {
+        let source = Source::open(&place, access.services.waiting.as_deref())?;
+        Ok((seq, place, Arc::new(source)))
+    };
+    if let Some(task) = tasks::start(state, start, effects, run, opened) {
         task.opening = Some(seq);
     }
 }
 
-/// Reads the index of a data set.
-pub struct Open {
-    /// The number of this opening.
-    seq: DatasetSeq,
-    place: Place,
-}
-
-impl Task for Open {
-    type End = (DatasetSeq, Place, Arc<Source>);
-    const KIND: TaskKind = TaskKind::Open;
-
-    fn what(&self) -> String {
-        format!("Open {}", self.place)
-    }
-
-    fn run(self, access: &Access, _: &JobCx) -> Result<Self::End, TaskError> {
-        let source = Source::open(&self.place, access.services.waiting.as_deref())?;
-        Ok((self.seq, self.place, Arc::new(source)))
-    }
-
-    fn ended((seq, place, source): &Self::End, state: &mut State, effects: &mut Vec<Effect>) {
-        // Else a later opening was started meanwhile: this one is not wanted any more.
-        if *seq == state.library.last_seq {
-            show(state, *seq, place.clone(), source, effects);
-        }
+/// A data set was opened.
+pub fn opened((seq, place, source): &(DatasetSeq, Place, Arc<Source>), state: &mut State, effects: &mut Vec<Effect>) {
+    // Else a later opening was started meanwhile: this one is not wanted any more.
+    if *seq == state.library.last_seq {
+        show(state, *seq, place.clone(), source, effects);
     }
 }
 
-/// Reads a tool's CAD file in another unit.
-pub struct ReadTool {
-    seq: DatasetSeq,
-    source: Arc<Source>,
-    tool: String,
-    unit: ToolUnit,
-    /// The unit that the file beside it says now, as the person was told.
-    replacing: Option<String>,
-}
-
-impl Task for ReadTool {
-    /// The data set that it is of, and what was done.
-    type End = (DatasetSeq, UnitSet);
-    const KIND: TaskKind = TaskKind::ReadTool;
-
-    fn what(&self) -> String {
-        format!("Read {} in {}", self.tool, self.unit.name())
+/// The CAD file of a tool is read in another unit, in a data set: what failed for it is tried again.
+pub fn tool_read((seq, set): &(DatasetSeq, UnitSet), state: &mut State, _: &mut Vec<Effect>) {
+    let done = format!("{} is now read in {}", set.tool, set.unit.name());
+    match &set.not_written {
+        None => state.log.saved(format!("{done}: unit.txt says {}", set.word), set.file.clone()),
+        Some(why) => state.log.push(
+            Level::Warning,
+            format!("{done} until this data set is closed: unit.txt could not be written"),
+            Some(why.clone()),
+            Some("Copy the data set to a folder you can write to".to_owned()),
+        ),
     }
-
-    fn run(self, _: &Access, _: &JobCx) -> Result<Self::End, TaskError> {
-        Ok((self.seq, set_unit(&self.source.dataset, &self.tool, self.unit, self.replacing.as_deref())?))
-    }
-
-    /// Has what failed for it tried again.
-    fn ended((seq, set): &Self::End, state: &mut State, _: &mut Vec<Effect>) {
-        let done = format!("{} is now read in {}", set.tool, set.unit.name());
-        match &set.not_written {
-            None => state.log.saved(format!("{done}: unit.txt says {}", set.word), set.file.clone()),
-            Some(why) => state.log.push(
-                Level::Warning,
-                format!("{done} until this data set is closed: unit.txt could not be written"),
-                Some(why.clone()),
-                Some("Copy the data set to a folder you can write to".to_owned()),
-            ),
-        }
-        if state.library.is_open(*seq) {
-            state.tasks.failed.clear();
-            state.library.units_named += 1;
-        }
+    if state.library.is_open(*seq) {
+        state.tasks.failed.clear();
+        state.library.units_named += 1;
     }
 }
 
@@ -222,14 +186,9 @@ fn select_row(state: &mut State, row: usize, effects: &mut Vec<Effect>) {
 
 fn step_by(state: &mut State, by: i64, effects: &mut Vec<Effect>) {
     let row = state.selection.pair.and_then(|pair| state.library.row_of(pair));
-    match row {
-        Some(row) => {
-            let row = (row as i64).saturating_add(by).max(0) as usize;
-            select_row(state, row, effects);
-        }
-        // What is selected was filtered away: start where the list starts.
-        None => select_row(state, 0, effects),
-    }
+    // Where what is selected was filtered away: start where the list starts.
+    let row = row.map_or(0, |row| (row as i64).saturating_add(by).max(0) as usize);
+    select_row(state, row, effects);
 }
 
 /// The next of the list whose review is not finished, going round.
@@ -241,11 +200,6 @@ fn next_unfinished(state: &State) -> Option<PairId> {
             && state.library.entry(**pair).is_some_and(|e| !state.document.review(&e.name).is_finished())
     };
     order[start.min(order.len())..].iter().chain(order).find(unfinished).copied()
-}
-
-fn select_next_unfinished(state: &mut State, effects: &mut Vec<Effect>) {
-    let next = next_unfinished(state);
-    select_unfinished(state, next, effects);
 }
 
 fn select_unfinished(state: &mut State, next: Option<PairId>, effects: &mut Vec<Effect>) {

@@ -6,33 +6,22 @@ use strum::EnumIter;
 
 use super::keys::ImprintSource;
 
-/// The arrangements of the same panes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, EnumIter)]
-#[serde(rename_all = "snake_case")]
-pub enum Workspace {
-    /// Truth and prediction side by side.
-    #[default]
-    Inspect,
-    /// The cloud on the CAD.
-    Align,
-    /// Correcting masks.
-    Label,
-    /// Numbers.
-    Evaluate,
-    /// Models made better on one's own sensors.
-    Adapt,
-}
-
-impl Workspace {
-    /// The name on screen.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Inspect => "Inspect",
-            Self::Align => "Align",
-            Self::Label => "Label",
-            Self::Evaluate => "Evaluate",
-            Self::Adapt => "Adapt",
-        }
+with_texts! {
+    /// The arrangements of the same panes.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, EnumIter)]
+    #[serde(rename_all = "snake_case")]
+    pub enum Workspace(name) {
+        /// Truth and prediction side by side.
+        #[default]
+        Inspect = "Inspect",
+        /// The cloud on the CAD.
+        Align = "Align",
+        /// Correcting masks.
+        Label = "Label",
+        /// Numbers.
+        Evaluate = "Evaluate",
+        /// Models made better on one's own sensors.
+        Adapt = "Adapt",
     }
 }
 

@@ -1,23 +1,23 @@
 //! The room of predictions: starting them, choosing among them, and the refit of their range.
 
-mod refit;
-
-pub use refit::Refit;
-
+use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::effect::{Access, Effect, Task};
-use super::keys::{Keyed, PredictionKey};
-use super::results::prediction;
-use super::source::Source;
+use super::effect::{Access, Effect};
+use super::keys::{ImprintSource, Keyed, PredictionKey, ShiftMode};
+use super::results::{self, prediction};
 use super::state::tasks::TaskKind;
 use super::state::{Absent, State};
-use super::{recipe, results, settings, tasks};
+use super::tasks::{self, Start};
+use super::{recipe, settings};
+use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::{PadId, Text};
-use touch2touch_core::sample::Sample;
 use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::io::statistics::ShiftStatistics;
 use touch2touch_pipeline::job::JobCx;
-use touch2touch_pipeline::steps::bundles::{BundleInfo, BundleKind};
+use touch2touch_pipeline::pairs;
+use touch2touch_pipeline::scores::statistics::{PAIRS, StatisticsSetup, statistics};
+use touch2touch_pipeline::steps::bundles::BundleKind;
 
 /// A command to predictions.
 #[derive(Clone, Debug)]
@@ -36,7 +36,7 @@ pub(super) fn step(state: &mut State, command: PredictCommand, effects: &mut Vec
     match command {
         PredictCommand::Generate => generate(state, false, effects),
         PredictCommand::GenerateNewSeed => generate(state, true, effects),
-        PredictCommand::Refit => refit::start(state, effects),
+        PredictCommand::Refit => refit(state, effects),
         PredictCommand::Choose(recipe) => {
             if state.results.predictions.contains(&recipe) {
                 results::pick(state, recipe);
@@ -96,39 +96,20 @@ fn start(state: &mut State, fingers: &[PadId], effects: &mut Vec<Effect>) {
     }
     let names: Vec<Text> = recipes.iter().map(|recipe| state.finger_name(recipe.touch.finger)).collect();
     let title = format!("Generate {} {}", state.pair_name(), names.join(" and "));
-    let task = Generate { recipes: recipes.clone(), bundle, source, sample };
-    if let Some(task) = tasks::start(state, title, task, effects) {
+    let start = Start { what: format!("Generate with {}", bundle.name), ..Start::new(TaskKind::Generate, title) };
+    let keys = recipes.clone();
+    let run = move |access: &Access, cx: &JobCx| {
+        prediction::generate(&access.services, keys, &bundle, &source, sample, cx, Some(access.onlooker.clone()))
+    };
+    if let Some(task) = tasks::start(state, start, effects, run, generated) {
         task.recipes = recipes;
     }
 }
 
-/// Makes predictions of one pair, all in one go.
-pub struct Generate {
-    recipes: Vec<PredictionKey>,
-    bundle: BundleInfo,
-    source: Arc<Source>,
-    /// The pair, if it is loaded.
-    sample: Option<Arc<Sample>>,
-}
-
-impl Task for Generate {
-    type End = Keyed;
-    const KIND: TaskKind = TaskKind::Generate;
-
-    fn what(&self) -> String {
-        format!("Generate with {}", self.bundle.name)
-    }
-
-    fn run(self, access: &Access, cx: &JobCx) -> Result<Keyed, TaskError> {
-        let Self { recipes, bundle, source, sample } = self;
-        let onlooker = Some(access.onlooker.clone());
-        prediction::generate(&access.services, recipes, &bundle, &source, sample, cx, onlooker)
-    }
-
-    fn ended(made: &Keyed, state: &mut State, _: &mut Vec<Effect>) {
-        for (key, prediction) in made {
-            results::keep_prediction(state, key.clone(), prediction.clone(), true);
-        }
+/// Predictions of one pair were made.
+pub fn generated(made: &Keyed, state: &mut State, _: &mut Vec<Effect>) {
+    for (key, prediction) in made {
+        results::keep_prediction(state, key.clone(), prediction.clone(), true);
     }
 }
 
@@ -140,4 +121,56 @@ fn next_seed(seed: u64) -> u64 {
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     (z ^ (z >> 31)) % 1_000_000
+}
+
+/// The job on screen.
+const STATISTICS: &str = "Shift statistics";
+
+/// Starts a pass over the data set, unless one is under way.
+fn refit(state: &mut State, effects: &mut Vec<Effect>) {
+    if state.tasks.running.values().any(|task| task.kind == TaskKind::Refit && !task.cancelling) {
+        return;
+    }
+    let ready = results::can_generate(state).and_then(|()| recipe::bundle(state, BundleKind::Generator));
+    if let Err(absent) = ready {
+        return state.log.error(&TaskError::new(STATISTICS, absent.text().trim_end_matches('.')));
+    }
+    let Some(source) = state.library.open.as_ref().map(|open| open.source.clone()) else { return };
+    let recipe = recipe::in_force(state, ImprintSource::Predicted);
+    let start = Start::new(TaskKind::Refit, format!("{STATISTICS} of {}", source.dataset.title));
+    let run = move |access: &Access, cx: &JobCx| {
+        let pairs = pairs::spread(source.dataset.index.pairs.len(), Some(PAIRS));
+        let setup = StatisticsSetup {
+            pairs: pairs.map(|at| PairId(at as u32)).collect(),
+            fingers: source.dataset.rig.pad_list(),
+            recipe,
+            dataset: source.dataset.title.clone(),
+        };
+        let (found, _) = statistics(&setup, |pair| source.load(pair).map(Arc::new), &access.services.models, cx)?;
+        let saved = access.services.save_statistics(&found)?;
+        Ok((found, saved))
+    };
+    tasks::start(state, start, effects, run, refitted);
+}
+
+/// Statistics were made, and where they are kept: uses them.
+pub fn refitted(
+    (statistics, saved): &(ShiftStatistics, Option<PathBuf>),
+    state: &mut State,
+    effects: &mut Vec<Effect>,
+) {
+    let p = &statistics.provenance;
+    match statistics.shift_for(&p.bundle, &p.bundle_hash) {
+        Ok(shift) => {
+            let place = saved.as_ref().map_or(String::new(), |file| format!(", kept in {}", file.display()));
+            state.log.info(format!(
+                "Shift statistics of {} touches of {} with {}{place}",
+                statistics.touches, p.dataset, p.bundle
+            ));
+            state.settings.refit = Some(shift);
+            state.settings.shift = ShiftMode::Refit(shift);
+            settings::save(state, effects);
+        }
+        Err(err) => state.log.error(&TaskError::from_error(STATISTICS, &err)),
+    }
 }

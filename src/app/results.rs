@@ -8,68 +8,40 @@ use std::sync::Arc;
 use super::jobs::Job;
 use super::services::Services;
 use super::state::State;
-use super::state::results::{Cached, Computed, Key, Request, table};
+use super::state::results::{Computed, Key, Request, table};
 use touch2touch_pipeline::error::TaskError;
 
 pub(crate) mod compare;
 pub(crate) mod estimate;
 pub(crate) mod imprint;
-pub(crate) mod labels;
-pub(crate) mod manual;
 pub(crate) mod mask;
 pub(crate) mod on_screen;
-pub(crate) mod outdated;
 pub(crate) mod plans;
 pub(crate) mod prediction;
-pub(crate) mod preview;
 pub(crate) mod proposal;
 pub(crate) mod registration;
 pub(crate) mod sample;
-pub(crate) mod scores;
-pub(crate) mod shown;
-pub(crate) mod tool;
 
-pub use compare::{comparison, subject, subject_key, subject_pose, subjects_compared};
-pub(crate) use compare::{want_compared, want_comparison};
-pub use estimate::{cloud, pose, pose_key, pose_of};
-pub(crate) use estimate::{cloud_key, latest, registered, want_side};
-pub(crate) use imprint::want_imprint;
-pub use imprint::{flags, imprint, predicted_color};
-pub use manual::{accepted, accepted_elsewhere, by_hand, manual_begins, shown_pose};
-pub(crate) use manual::{shown_imprint, sides_apart};
-pub use mask::{MaskInForce, drawn_mask, mask_in_force, mask_places};
-pub(crate) use mask::{
-    automatic_mask, automatic_provenance, awaits_tool, drawn_mask_on, mask_place, mask_recipe, mask_version, want_mask,
-};
-pub use on_screen::proposes;
-pub(crate) use on_screen::{fingers_to_generate, shows_cloud, shows_deviation, shows_layers, shows_steps};
-pub use outdated::{Outdated, Why, outdated};
-pub(crate) use plans::{
-    doctor_key, import_setup, train_plan_key, want_doctor, want_import_plan, want_mask_plan, want_train_plan,
-};
-pub use plans::{import_plan_key, mask_plan_key};
-pub use prediction::can_generate;
-pub(crate) use prediction::{
-    can_start, keep_prediction, prefetch, want_other_finger, want_predictions_ahead, want_stored,
-};
-pub use preview::{Onlooker, PreviewRequest, preview, preview_request};
-pub(crate) use proposal::want_proposal;
-pub use proposal::{proposal, proposal_key, shown_proposal};
-pub use registration::{deviation, inspected, inspection, layers, ranking};
-pub(crate) use registration::{inspected_in, run_key, want_deviation, want_inspection, want_layers};
-pub use sample::{bubble, gelslim, sample, thumbnail, touch, truth};
-pub(crate) use sample::{gone, want_thumbnails};
-pub use scores::evaluated;
-pub(crate) use scores::evaluation_setup;
-pub use shown::{chosen, imprint_key, shown, worked_on};
-pub(crate) use shown::{imprint_of, pick, picked};
-pub use tool::{tool, tool_name};
-pub(crate) use tool::{tool_key, want_tool};
+pub use compare::*;
+pub use estimate::*;
+pub use imprint::*;
+pub use mask::*;
+pub use on_screen::*;
+pub use plans::*;
+pub use prediction::*;
+pub use proposal::*;
+pub use registration::*;
+pub use sample::*;
 
 /// A key that says how its result is computed.
 pub(crate) trait Computes: Key {
     /// The job, with its inputs gathered; `None` if one is not there (any more).
     fn job(&self, state: &State, services: &Arc<Services>) -> Option<Job<Self::Value>>;
+
+    /// True where it is there, or on its way, though no cache of its own says so.
+    fn is_there(&self, _state: &State) -> bool {
+        false
+    }
 
     /// Asks for it where a pane on screen needs it and nothing else asks.
     fn wanted(_wants: &mut Demands<'_>) {}
@@ -91,6 +63,13 @@ macro_rules! computing {
         /// Asks for the results that say themselves when they are wanted, in the order of the table.
         pub(crate) fn want_others(wants: &mut Demands<'_>) {
             $( <$crate::app::keys::$key as Computes>::wanted(wants); )*
+        }
+
+        /// True where a result is there, so that nobody needs to ask for it.
+        fn is_there(request: &Request, state: &State) -> bool {
+            match request { $( Request::$variant(key) => {
+                $( state.results.$cache.contains(key) || )? key.is_there(state)
+            } )* }
         }
 
         /// The job of a request; `None` if an input is not there (any more).
@@ -126,17 +105,10 @@ pub(crate) struct Demands<'a> {
 
 impl Demands<'_> {
     /// Asks for a result, unless it is there or could not be computed.
-    pub(crate) fn ask<K: Cached>(&mut self, key: K) {
-        self.ask_unless(K::cache(&self.state.results).contains(&key), key);
-    }
-
-    /// Asks for a result whose being there is not told by a cache of its own.
-    pub(crate) fn ask_unless(&mut self, there: bool, request: impl Into<Request>) {
-        if there {
-            return;
-        }
+    pub(crate) fn ask(&mut self, request: impl Into<Request>) {
         let request = request.into();
-        if !self.state.tasks.failed.contains_key(&request) && !self.list.contains(&request) {
+        let known = is_there(&request, self.state) || self.state.tasks.failed.contains_key(&request);
+        if !known && !self.list.contains(&request) {
             self.list.push(request);
         }
     }

@@ -17,7 +17,7 @@ use super::command::{Command, LabelsCommand, LibraryCommand, UnsavedCommand};
 use super::effect::Effect;
 use super::jobs::Worker;
 use super::keys::{DatasetSeq, Preview, TouchKey};
-use super::results::preview::PreviewRequest;
+use super::results::prediction::PreviewRequest;
 use super::services::Services;
 use super::state::State;
 use super::state::library::Place;

@@ -127,29 +127,22 @@ impl Services {
                 return (Settings::default(), Some(TaskError::new("The preferences could not be read", why)));
             }
         };
+        let (settings, why, what) = match parse_settings(&bytes) {
+            Ok((settings, refused)) if refused.is_empty() => return (settings.validated(), None),
+            Ok((settings, refused)) => (Some(settings), refused.join("; "), "Some preferences"),
+            Err(why) => (None, why, "Preferences"),
+        };
         let bad = folder.join(BAD_SETTINGS_FILE);
-        match parse_settings(&bytes) {
-            Ok((settings, refused)) => {
-                let problem = (!refused.is_empty()).then(|| {
-                    let why = format!("{} ({})", refused.join("; "), file.display());
-                    let kept = match std::fs::copy(&file, &bad) {
-                        Ok(_) => format!("Old file: {}", bad.display()),
-                        Err(err) => format!("The old file could not be kept: {err}"),
-                    };
-                    TaskError::new("Some preferences could not be read and were reset", why).with_hint(kept)
-                });
-                (settings.validated(), problem)
-            }
-            Err(why) => {
-                let kept = match std::fs::rename(&file, &bad) {
-                    Ok(()) => format!("Old file: {}", bad.display()),
-                    Err(err) => format!("The old file could not be kept: {err}."),
-                };
-                let why = format!("{why} ({})", file.display());
-                let problem = TaskError::new("Preferences could not be read and were reset", why).with_hint(kept);
-                (Settings::default(), Some(problem))
-            }
-        }
+        // What is read still is the file to start from; one of which nothing is must not be read again.
+        let set_aside =
+            if settings.is_some() { std::fs::copy(&file, &bad).map(drop) } else { std::fs::rename(&file, &bad) };
+        let kept = match set_aside {
+            Ok(()) => format!("Old file: {}", bad.display()),
+            Err(err) => format!("The old file could not be kept: {err}."),
+        };
+        let why = format!("{why} ({})", file.display());
+        let problem = TaskError::new(format!("{what} could not be read and were reset"), why).with_hint(kept);
+        (settings.unwrap_or_default().validated(), Some(problem))
     }
 }
 

@@ -13,7 +13,6 @@ pub mod learn;
 pub mod library;
 pub mod results;
 pub mod settings;
-pub mod shown;
 pub mod tasks;
 pub mod view;
 pub mod workbench;
@@ -236,9 +235,7 @@ impl<'a, T: ?Sized> Lookup<'a, T> {
             _ => self.without(),
         }
     }
-}
 
-impl<'a, T: ?Sized> Lookup<'a, T> {
     /// Part of a value.
     pub fn map<U: ?Sized>(self, f: impl FnOnce(&'a T) -> &'a U) -> Lookup<'a, U> {
         match self {
@@ -264,80 +261,51 @@ impl<'a, T> Lookup<'a, Arc<T>> {
     }
 }
 
-/// Why something cannot be shown, and what brings it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Absent {
-    /// No data set is open.
-    NothingOpen,
-    /// No pair is selected.
-    NothingSelected,
-    /// The source has no such finger.
-    NoFinger,
-    /// The finger has no GelSlim image.
-    NoGelSlim,
-    /// The finger has no reading of the sensor that the generator starts from.
-    NoInput,
-    /// The prediction is a color picture.
-    PredictsColor,
-    /// The generators that were found are for other sensors.
-    OtherSensors,
-    /// The source only has the GelSlim difference image.
-    OnlyDifference,
-    /// The finger has no measured imprint.
-    NoBubble,
-    /// Nothing was generated yet.
-    NoPrediction,
-    /// The source has no camera: no points in space.
-    NoCamera,
-    /// The source does not say which tool it was.
-    NoTool,
-    /// The true pose is not known.
-    NoTruth,
-    /// The source is not simulated.
-    NotSimulated,
-    /// No mask model was found.
-    NoMaskModel,
-    /// No generator was found.
-    NoGenerator,
-    /// The generator that was named is not there any more.
-    NoSuchGenerator,
-    /// No tool classifier was found.
-    NoClassifier,
-    /// The mask has too few contact points.
-    NoContact,
-    /// No pose was set by hand.
-    NoHandPose,
-    /// Nothing was painted by hand on the mask.
-    NoStrokes,
-}
-
-impl Absent {
-    /// The sentence that says what is missing.
-    pub fn text(self) -> &'static str {
-        match self {
-            Self::NothingOpen => "No data set is open. Drop a folder here, or open the demo.",
-            Self::NothingSelected => "No pair is selected.",
-            Self::NoFinger => "These data have no such finger.",
-            Self::NoGelSlim => "This finger has no GelSlim image.",
-            Self::NoInput => "This finger has no image that the model could start from.",
-            Self::PredictsColor => "The prediction is a color image: no depth, so no contact, points or pose.",
-            Self::OtherSensors => "No generator fits the sensors of this data set; see the list of models.",
-            Self::OnlyDifference => "These data only have the difference image.",
-            Self::NoBubble => "This finger has no measured imprint.",
-            Self::NoPrediction => "No prediction yet.",
-            Self::NoCamera => "No depth camera in these data: no 3D points, no pose.",
-            Self::NoTool => "Tool unknown: no CAD model, no pose.",
-            Self::NoTruth => "True pose unknown.",
-            Self::NotSimulated => "The true contact is known for simulated data only.",
-            Self::NoMaskModel => "No mask model was found.",
-            Self::NoGenerator => "No generator was found.",
-            Self::NoSuchGenerator => "The chosen model is gone; choose another.",
-            Self::NoClassifier => "No tool classifier was found.",
-            Self::NoContact => "The mask has too few contact points for a pose.",
-            Self::NoHandPose => "No pose set by hand yet: move the tool with the pose tool.",
-            Self::NoStrokes => {
-                "Nothing to grow from: paint a short stroke on the contact, and one with the right button beside it."
-            }
-        }
+with_texts! {
+    /// Why something cannot be shown, and what brings it.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum Absent(text) {
+        /// No data set is open.
+        NothingOpen = "No data set is open. Drop a folder here, or open the demo.",
+        /// No pair is selected.
+        NothingSelected = "No pair is selected.",
+        /// The source has no such finger.
+        NoFinger = "These data have no such finger.",
+        /// The finger has no GelSlim image.
+        NoGelSlim = "This finger has no GelSlim image.",
+        /// The finger has no reading of the sensor that the generator starts from.
+        NoInput = "This finger has no image that the model could start from.",
+        /// The prediction is a color picture.
+        PredictsColor = "The prediction is a color image: no depth, so no contact, points or pose.",
+        /// The generators that were found are for other sensors.
+        OtherSensors = "No generator fits the sensors of this data set; see the list of models.",
+        /// The source only has the GelSlim difference image.
+        OnlyDifference = "These data only have the difference image.",
+        /// The finger has no measured imprint.
+        NoBubble = "This finger has no measured imprint.",
+        /// Nothing was generated yet.
+        NoPrediction = "No prediction yet.",
+        /// The source has no camera: no points in space.
+        NoCamera = "No depth camera in these data: no 3D points, no pose.",
+        /// The source does not say which tool it was.
+        NoTool = "Tool unknown: no CAD model, no pose.",
+        /// The true pose is not known.
+        NoTruth = "True pose unknown.",
+        /// The source is not simulated.
+        NotSimulated = "The true contact is known for simulated data only.",
+        /// No mask model was found.
+        NoMaskModel = "No mask model was found.",
+        /// No generator was found.
+        NoGenerator = "No generator was found.",
+        /// The generator that was named is not there any more.
+        NoSuchGenerator = "The chosen model is gone; choose another.",
+        /// No tool classifier was found.
+        NoClassifier = "No tool classifier was found.",
+        /// The mask has too few contact points.
+        NoContact = "The mask has too few contact points for a pose.",
+        /// No pose was set by hand.
+        NoHandPose = "No pose set by hand yet: move the tool with the pose tool.",
+        /// Nothing was painted by hand on the mask.
+        NoStrokes = "Nothing to grow from: paint a short stroke on the contact, and one with the right button beside it.",
     }
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 pub(crate) use super::state::tasks::RunningTask;
 pub use super::state::tasks::{Entry, Level, Log, TaskKind, Tasks, Ticket};
 
-use super::effect::{Access, Effect, Task, TaskJob};
+use super::effect::{Access, Effect, TaskJob, TaskResult};
 use super::jobs::Worker;
 use super::state::State;
 use touch2touch_pipeline::error::TaskError;
@@ -50,74 +50,62 @@ pub(super) fn step(state: &mut State, command: TasksCommand, effects: &mut Vec<E
     }
 }
 
-/// Starts a task, listed under a title while it runs. `None` where one of its kind has to end first.
-pub(super) fn start<'a, E: Task>(
+/// What is said of a job that a person starts, and where it runs.
+pub(super) struct Start {
+    pub kind: TaskKind,
+    /// The name on screen.
+    pub title: String,
+    /// The work that it does, for errors.
+    pub what: String,
+    pub worker: Worker,
+}
+
+impl Start {
+    /// In the words of its kind, on the worker of its kind.
+    pub(super) fn new(kind: TaskKind, title: impl Into<String>) -> Self {
+        Self { kind, title: title.into(), what: kind.name().to_owned(), worker: kind.worker() }
+    }
+}
+
+/// Starts a task, which is listed while it runs: what it does, and the consequences of its end. `None` where one of its kind has
+/// to end first.
+pub(super) fn start<'a, E: Send + Sync + 'static>(
     state: &'a mut State,
-    title: impl Into<String>,
-    task: E,
+    Start { kind, title, what, worker }: Start,
     effects: &mut Vec<Effect>,
+    run: impl FnOnce(&Access, &JobCx) -> Result<E, TaskError> + Send + 'static,
+    ended: fn(&E, &mut State, &mut Vec<Effect>),
 ) -> Option<&'a mut RunningTask> {
-    if E::KIND.worker() == Worker::Batch && state.tasks.of_kind(E::KIND).is_some() {
+    if kind.worker() == Worker::Batch && state.tasks.of_kind(kind).is_some() {
         return None;
     }
     state.tasks.last_ticket += 1;
     let ticket = Ticket(state.tasks.last_ticket);
-    effects.push(Effect::Start(ticket, TaskJob::new(task)));
-    let task = RunningTask {
-        kind: E::KIND,
-        title: title.into(),
-        progress: Progress::default(),
-        recipes: Vec::new(),
-        opening: None,
-        cancelling: false,
-        outdated: false,
-    };
+    let body =
+        Box::new(move |access: &Access, cx: &JobCx| run(access, cx).map(|end| TaskResult::new(kind, end, ended)));
+    effects.push(Effect::Start(ticket, TaskJob { what, worker, body }));
+    let (progress, recipes) = (Progress::default(), Vec::new());
+    let task = RunningTask { kind, title, progress, recipes, opening: None, cancelling: false, outdated: false };
     Some(state.tasks.running.entry(ticket).or_insert(task))
 }
 
-/// Something that is written to a place that a person named: what it says then, and where it lies.
-type Writer = Box<dyn FnOnce(PathBuf, &Access, &JobCx) -> Result<(String, PathBuf), TaskError> + Send>;
-
-/// Has something written.
-pub struct Write {
-    worker: Worker,
-    what: &'static str,
+/// Has something written to a place that a person named: what it says then, and where it lies.
+pub(super) fn write(
+    state: &mut State,
+    (worker, what, title): (Worker, &str, &str),
     place: PathBuf,
-    writer: Writer,
+    effects: &mut Vec<Effect>,
+    writer: impl FnOnce(PathBuf, &Access, &JobCx) -> Result<(String, PathBuf), TaskError> + Send + 'static,
+) {
+    let job = Start { what: what.to_owned(), worker, ..Start::new(TaskKind::Write, title) };
+    // As the system knows it, whatever folder the program was started in: what the log says must be found again.
+    let run = |access: &Access, cx: &JobCx| writer(std::path::absolute(&place).unwrap_or(place), access, cx);
+    start(state, job, effects, run, written);
 }
 
-impl Write {
-    /// On a worker, in these words, to that place.
-    pub(super) fn new(
-        worker: Worker,
-        what: &'static str,
-        place: PathBuf,
-        writer: impl FnOnce(PathBuf, &Access, &JobCx) -> Result<(String, PathBuf), TaskError> + Send + 'static,
-    ) -> Self {
-        Self { worker, what, place, writer: Box::new(writer) }
-    }
-}
-
-impl Task for Write {
-    type End = (String, PathBuf);
-    const KIND: TaskKind = TaskKind::Write;
-
-    fn what(&self) -> String {
-        self.what.to_owned()
-    }
-
-    fn worker(&self) -> Worker {
-        self.worker
-    }
-
-    fn run(self, access: &Access, cx: &JobCx) -> Result<Self::End, TaskError> {
-        // As the system knows it, whatever folder the program was started in: what the log says must be found again.
-        (self.writer)(std::path::absolute(&self.place).unwrap_or(self.place), access, cx)
-    }
-
-    fn ended((line, place): &Self::End, state: &mut State, _: &mut Vec<Effect>) {
-        state.log.saved(line, place.clone());
-    }
+/// Something was written.
+pub fn written((line, place): &(String, PathBuf), state: &mut State, _: &mut Vec<Effect>) {
+    state.log.saved(line, place.clone());
 }
 
 /// Tells every job to stop.

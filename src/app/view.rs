@@ -1,6 +1,6 @@
 //! The room of what is on screen.
 
-pub use super::state::view::{CameraPreset, Hover, UiRequest};
+pub use super::state::view::{CameraPreset, Hover, Purpose, UiRequest};
 
 use std::collections::BTreeSet;
 

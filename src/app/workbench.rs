@@ -147,7 +147,7 @@ fn start_icp(state: &mut State, effects: &mut Vec<Effect>) {
     // The pane of the steps shows the same run, at its end: there the tool in hand goes.
     inspect::step(state, InspectCommand::Source(source), effects);
     inspect::step(state, InspectCommand::Start(Some(start)), effects);
-    inspect::step(state, InspectCommand::End, effects);
+    state.inspect.at = None;
 }
 
 /// A recorded registration is there: the tool in hand goes where the one it waits for ended.

@@ -31,22 +31,18 @@ pub struct Segment {
     pub rgba: [u8; 4],
 }
 
-/// Style and pose of lines.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LinesStyle {
-    /// From the lines' frame to the world (the grasp frame).
-    pub world_from_lines: DAffine3,
-    /// Physical pixels.
-    pub width_px: f32,
-    /// 0..1, on top of each segment's own.
-    pub opacity: f32,
-    /// Drawn over everything instead of hidden by what is in front.
-    pub overlay: bool,
-}
-
-impl Default for LinesStyle {
-    fn default() -> Self {
-        Self { world_from_lines: DAffine3::IDENTITY, width_px: 1.5, opacity: 1.0, overlay: false }
+with_defaults! {
+    /// Style and pose of lines.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct LinesStyle {
+        /// From the lines' frame to the world (the grasp frame).
+        pub world_from_lines: DAffine3 = DAffine3::IDENTITY,
+        /// Physical pixels.
+        pub width_px: f32 = 1.5,
+        /// 0..1, on top of each segment's own.
+        pub opacity: f32 = 1.0,
+        /// Drawn over everything instead of hidden by what is in front.
+        pub overlay: bool = false,
     }
 }
 

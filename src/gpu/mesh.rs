@@ -55,39 +55,24 @@ pub enum Look {
     Outline,
 }
 
-/// Style and pose of a mesh.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MeshStyle {
-    /// From the mesh's frame (the object frame) to the world (the grasp frame). A rigid motion.
-    pub world_from_mesh: DAffine3,
-    /// sRGB, 0..1.
-    pub color: [f32; 3],
-    /// 0..1.
-    pub opacity: f32,
-    /// Solid, x-ray, or edges alone.
-    pub look: Look,
-    /// Style of its edges, if they are drawn.
-    pub edges: Option<EdgeStyle>,
-    /// For [`MeshItem::values`].
-    pub map: ColorMap,
-    /// For [`MeshItem::values`].
-    pub range: Range,
-    /// True where the surface has an inside: what a plane lays open is then filled.
-    pub closed: bool,
-}
-
-impl Default for MeshStyle {
-    fn default() -> Self {
-        Self {
-            world_from_mesh: DAffine3::IDENTITY,
-            color: [0.75, 0.75, 0.78],
-            opacity: 1.0,
-            look: Look::Solid,
-            edges: None,
-            map: ColorMap::Diverging,
-            range: Range { lo: 0.0, hi: 1.0 },
-            closed: true,
-        }
+with_defaults! {
+    /// Style and pose of a mesh.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct MeshStyle {
+        /// From the mesh's frame (the object frame) to the world (the grasp frame). A rigid motion.
+        pub world_from_mesh: DAffine3 = DAffine3::IDENTITY,
+        /// sRGB, 0..1.
+        pub color: [f32; 3] = [0.75, 0.75, 0.78],
+        /// 0..1.
+        pub opacity: f32 = 1.0,
+        /// Solid, x-ray, or edges alone.
+        pub look: Look = Look::Solid,
+        /// Style of its edges, if they are drawn.
+        pub edges: Option<EdgeStyle> = None,
+        /// For [`MeshItem::values`].
+        pub map: ColorMap = ColorMap::Diverging,
+        /// For [`MeshItem::values`].
+        pub range: Range = Range { lo: 0.0, hi: 1.0 },
     }
 }
 
@@ -102,7 +87,6 @@ pub(super) struct MeshUniform {
     pub(super) lo: f32,
     pub(super) hi: f32,
     pub(super) map: u32,
-    pub(super) closed: u32,
 }
 
 /// A mesh on the device.
@@ -143,7 +127,6 @@ impl MeshData {
                 lo: range.lo,
                 hi: range.hi,
                 map: style.map as u32,
-                closed: u32::from(style.closed),
             },
         );
         let mut did = [uploaded, written];

@@ -1,6 +1,6 @@
 //! Picking: the point under the pointer, found on the CPU: exact, and the same on every machine.
 
-use glam::{DAffine3, DVec2, DVec3};
+use glam::{DVec2, DVec3};
 
 use super::view::{Camera, Projector};
 
@@ -19,15 +19,8 @@ pub struct Hit {
 /// the screen, the one nearest to the eye. `None` if no point is within `radius_px`.
 ///
 /// Points that are not finite or behind the eye are never picked. What hides a point is not taken into account.
-pub fn nearest_point(
-    points: &[DVec3],
-    world_from_points: &DAffine3,
-    camera: &Camera,
-    size: [u32; 2],
-    px: DVec2,
-    radius_px: f64,
-) -> Option<Hit> {
-    let projector = Projector::new(camera, world_from_points, size);
+pub fn nearest_point(points: &[DVec3], camera: &Camera, size: [u32; 2], px: DVec2, radius_px: f64) -> Option<Hit> {
+    let projector = Projector::new(camera, size);
     let near: Vec<Hit> = points
         .iter()
         .enumerate()
@@ -50,13 +43,12 @@ mod tests {
     #[test]
     fn every_point_of_a_cloud_is_found_under_its_own_pixel() {
         let camera = Camera::default();
-        let moved = DAffine3::from_translation(DVec3::new(0.003, 0.0, -0.002));
         let points: Vec<DVec3> = (0..400)
             .map(|i| DVec3::new(0.0, (f64::from(i % 20) - 10.0) * 0.002, (f64::from(i / 20) - 10.0) * 0.002))
             .collect();
         for (i, p) in points.iter().enumerate() {
-            let (px, depth) = camera.project(moved.transform_point3(*p), SIZE).unwrap();
-            let hit = nearest_point(&points, &moved, &camera, SIZE, px, 4.0).unwrap();
+            let (px, depth) = camera.project(*p, SIZE).unwrap();
+            let hit = nearest_point(&points, &camera, SIZE, px, 4.0).unwrap();
             assert_eq!(hit.index, i);
             assert!(hit.distance_px < 1e-9 && (hit.depth_m - depth).abs() < 1e-12);
         }
@@ -68,11 +60,11 @@ mod tests {
         let towards = camera.axes()[2];
         let points = [DVec3::NAN, DVec3::ZERO, towards * 0.02, towards * 0.01, towards];
         let center = DVec2::new(200.0, 150.0);
-        let pick = |px, radius| nearest_point(&points, &DAffine3::IDENTITY, &camera, SIZE, px, radius);
+        let pick = |px, radius| nearest_point(&points, &camera, SIZE, px, radius);
         assert_eq!(pick(center, 3.0).unwrap().index, 2);
         assert_eq!(pick(center + DVec2::X * 5.0, 4.9), None);
         assert_eq!(pick(center + DVec2::X * 5.0, 5.1).unwrap().index, 2);
         assert_eq!(pick(DVec2::NAN, 5.0), None);
-        assert_eq!(nearest_point(&[], &DAffine3::IDENTITY, &camera, SIZE, center, 9.0), None);
+        assert_eq!(nearest_point(&[], &camera, SIZE, center, 9.0), None);
     }
 }

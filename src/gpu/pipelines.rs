@@ -46,6 +46,7 @@ pub struct Pipelines {
 }
 
 /// Settings that differ between the pipelines.
+#[derive(Clone, Copy)]
 struct Variant<'a> {
     label: &'a str,
     module: &'a wgpu::ShaderModule,
@@ -128,84 +129,36 @@ impl Pipelines {
                 depth: Depth::Hides,
                 stencil: Stencil::Marks,
             };
-            let lit = Variant {
-                label: "Mesh::solid",
-                module: &mesh,
-                item_layout: &plain_layout,
-                vertices: &[Some(VERTEX_LAYOUT)],
-                blend: true,
-                ..pulled
-            };
-            let screen = Variant {
-                label: "Edl::pipeline",
-                module: &edl,
-                item_layout: &depth_layout,
-                blend: true,
-                depth: Depth::Absent,
-                ..pulled
-            };
+            // Hides nothing.
+            let over = Variant { blend: true, depth: Depth::Tests, stencil: Stencil::Unused, ..pulled };
+            let vertices = &[Some(VERTEX_LAYOUT)];
+            let lit = Variant { label: "Mesh::solid", module: &mesh, item_layout: &plain_layout, vertices, ..pulled };
+            let lit = Variant { blend: true, ..lit };
             let veil = |label, fragment, depth, stencil| build(Variant { label, fragment, depth, stencil, ..lit });
+            let edge = Variant { label: "Edges::pipeline", module: &edges, ..over };
+            let line = Variant { label: "Lines::pipeline", module: &lines, ..over };
+            let screen = Variant { label: "Edl::pipeline", module: &edl, item_layout: &depth_layout, ..pulled };
+            let screen = Variant { blend: true, depth: Depth::Absent, ..screen };
+            let hidden = Variant { label: "Edges::overlay", fragment: "fs_hidden", depth: Depth::Ignores, ..edge };
             Ok(Self {
-                points: build(Variant { ..pulled }),
-                points_translucent: build(Variant {
-                    label: "Points::translucent",
-                    blend: true,
-                    depth: Depth::Tests,
-                    stencil: Stencil::Unused,
-                    ..pulled
-                }),
-                mesh_solid: build(Variant { ..lit }),
+                points: build(pulled),
+                points_translucent: build(Variant { label: "Points::translucent", ..over }),
+                mesh_solid: build(lit),
                 mesh_xray: build(Variant { label: "Mesh::xray", depth: Depth::Tests, stencil: Stencil::Unused, ..lit }),
                 veil: [
                     veil("Veil::depth", "fs_depth", Depth::Only, Stencil::Unused),
                     veil("Veil::beside", "fs_veil", Depth::Equals, Stencil::Beside),
                     veil("Veil::before", "fs_veil_thin", Depth::Equals, Stencil::Before),
                 ],
-                floor: build(Variant {
-                    label: "Floor::pipeline",
-                    module: &floor,
-                    item_layout: &floor_layout,
-                    blend: true,
-                    depth: Depth::Tests,
-                    stencil: Stencil::Unused,
-                    ..pulled
-                }),
-                shadow: thrown("Shadow::pipeline", &plain_layout, &[Some(VERTEX_LAYOUT)], ["vs_main", "fs_main"]),
+                floor: build(Variant { label: "Floor::pipeline", module: &floor, item_layout: &floor_layout, ..over }),
+                shadow: thrown("Shadow::pipeline", &plain_layout, vertices, ["vs_main", "fs_main"]),
                 shadow_across: thrown("Shadow::across", &picture_layout, &[], ["vs_blur", "fs_across"]),
                 shadow_down: thrown("Shadow::down", &picture_layout, &[], ["vs_blur", "fs_down"]),
-                edges: build(Variant {
-                    label: "Edges::pipeline",
-                    module: &edges,
-                    blend: true,
-                    depth: Depth::Tests,
-                    ..pulled
-                }),
-                edges_overlay: build(Variant {
-                    label: "Edges::overlay",
-                    module: &edges,
-                    fragment: "fs_hidden",
-                    blend: true,
-                    depth: Depth::Ignores,
-                    stencil: Stencil::Unused,
-                    ..pulled
-                }),
-                lines: build(Variant {
-                    label: "Lines::pipeline",
-                    module: &lines,
-                    blend: true,
-                    depth: Depth::Tests,
-                    stencil: Stencil::Unused,
-                    ..pulled
-                }),
-                lines_overlay: build(Variant {
-                    label: "Lines::overlay",
-                    module: &lines,
-                    blend: true,
-                    depth: Depth::Ignores,
-                    stencil: Stencil::Unused,
-                    ..pulled
-                }),
-                edl: build(Variant { ..screen }),
+                edges: build(Variant { stencil: Stencil::Marks, ..edge }),
+                edges_overlay: build(hidden),
+                lines: build(line),
+                lines_overlay: build(Variant { label: "Lines::overlay", depth: Depth::Ignores, ..line }),
+                edl: build(screen),
                 hollows: build(Variant { label: "Edl::hollows", fragment: "fs_hollows", ..screen }),
                 floor_sampler: gpu.sampler("Floor::sampler", wgpu::FilterMode::Linear),
                 view_layout,

@@ -46,39 +46,22 @@ pub enum PointSize {
     Meters(f32),
 }
 
-/// Style and pose of a cloud.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CloudStyle {
-    /// From the cloud's frame to the world (the grasp frame).
-    pub world_from_points: DAffine3,
-    /// sRGB, 0..1, for [`PointColors::One`].
-    pub color: [f32; 3],
-    /// For [`PointColors::Scalar`].
-    pub map: ColorMap,
-    /// For [`PointColors::Scalar`].
-    pub range: Range,
-    /// Diameter.
-    pub size: PointSize,
-    /// 0..1; below 1 nothing is hidden by the points.
-    pub opacity: f32,
-    /// Index of a point to mark; one that does not exist marks nothing.
-    pub selected: Option<usize>,
-    /// sRGB, 0..1, of the marked point.
-    pub highlight: [f32; 3],
-}
-
-impl Default for CloudStyle {
-    fn default() -> Self {
-        Self {
-            world_from_points: DAffine3::IDENTITY,
-            color: [0.2, 0.6, 1.0],
-            map: ColorMap::Viridis,
-            range: Range { lo: 0.0, hi: 1.0 },
-            size: PointSize::Px(3.0),
-            opacity: 1.0,
-            selected: None,
-            highlight: [1.0, 0.85, 0.1],
-        }
+with_defaults! {
+    /// Style and pose of a cloud.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct CloudStyle {
+        /// From the cloud's frame to the world (the grasp frame).
+        pub world_from_points: DAffine3 = DAffine3::IDENTITY,
+        /// sRGB, 0..1, for [`PointColors::One`].
+        pub color: [f32; 3] = [0.2, 0.6, 1.0],
+        /// For [`PointColors::Scalar`].
+        pub map: ColorMap = ColorMap::Viridis,
+        /// For [`PointColors::Scalar`].
+        pub range: Range = Range { lo: 0.0, hi: 1.0 },
+        /// Diameter.
+        pub size: PointSize = PointSize::Px(3.0),
+        /// 0..1; below 1 nothing is hidden by the points.
+        pub opacity: f32 = 1.0,
     }
 }
 
@@ -96,7 +79,6 @@ pub(super) struct PointVertex {
 pub(super) struct PointsUniform {
     pub(super) world_from_points: [f32; 16],
     pub(super) color: [f32; 4],
-    pub(super) highlight: [f32; 4],
     pub(super) lo: f32,
     pub(super) hi: f32,
     pub(super) size: f32,
@@ -104,8 +86,6 @@ pub(super) struct PointsUniform {
     pub(super) color_mode: u32,
     pub(super) map: u32,
     pub(super) stride: u32,
-    pub(super) drawn: u32,
-    pub(super) selected: u32,
 }
 
 /// A cloud on the device.
@@ -132,12 +112,9 @@ impl PointsData {
         let (on, label) = ((gpu, pipelines), ["Points", &item.name]);
         let (old, usage) = (old.map(|data| data.item), wgpu::BufferUsages::STORAGE);
         let (mut data, uploaded) = Item::upload(on, label, old, wanted, usage, || vertices(item))?;
-        let count = data.elements.count;
         let stride = stride.max(1);
-        let drawn = count.div_ceil(stride);
-        let selected = item.style.selected.and_then(|i| u32::try_from(i).ok()).filter(|i| *i < count);
-        let instances = drawn + u32::from(selected.is_some());
-        let written = data.uniform.set(gpu, uniform(&item.style, wanted.1, stride, drawn, selected));
+        let instances = data.elements.count.div_ceil(stride);
+        let written = data.uniform.set(gpu, uniform(&item.style, wanted.1, stride));
         Ok((Self { item: data, instances }, [uploaded, written]))
     }
 
@@ -173,18 +150,16 @@ fn vertices(item: &CloudItem) -> Vec<PointVertex> {
 }
 
 /// The numbers that go with a cloud.
-fn uniform(style: &CloudStyle, color_mode: u32, stride: u32, drawn: u32, selected: Option<u32>) -> PointsUniform {
+fn uniform(style: &CloudStyle, color_mode: u32, stride: u32) -> PointsUniform {
     let (size, size_in_meters) = match style.size {
         PointSize::Px(px) => (px, 0),
         PointSize::Meters(m) => (m, 1),
     };
     let [r, g, b] = style.color;
-    let [hr, hg, hb] = style.highlight;
     let range = drawable(style.range);
     PointsUniform {
         world_from_points: view::matrix(&style.world_from_points),
         color: [r, g, b, style.opacity.clamp(0.0, 1.0)],
-        highlight: [hr, hg, hb, 1.0],
         lo: range.lo,
         hi: range.hi,
         size: if size.is_finite() { size } else { 1.0 },
@@ -192,7 +167,5 @@ fn uniform(style: &CloudStyle, color_mode: u32, stride: u32, drawn: u32, selecte
         color_mode,
         map: style.map as u32,
         stride,
-        drawn,
-        selected: selected.unwrap_or(u32::MAX),
     }
 }

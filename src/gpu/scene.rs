@@ -15,55 +15,36 @@ use super::mesh::{Look, MeshData, MeshItem};
 use super::pipelines::Pipelines;
 use super::points::{CloudItem, PointsData};
 use super::target::{Pass, Target};
-use super::view::{self, Camera, Part, Plane, ViewUniform};
+use super::view::{self, Camera, Part, ViewUniform};
 use super::{Gpu, GpuError, wgpu};
 
-/// Everything that one view shows. Cheap to make anew for every frame: the geometry is shared.
-#[derive(Clone, Debug)]
-pub struct SceneData {
-    /// sRGB, 0..1.
-    pub background: [f32; 3],
-    /// Point clouds, with different names.
-    pub clouds: Vec<CloudItem>,
-    /// Meshes, with different names.
-    pub meshes: Vec<MeshItem>,
-    /// Lines, with different names.
-    pub lines: Vec<LinesItem>,
-    /// Planes that cut meshes and points; only [`MAX_PLANES`] do.
-    ///
-    /// [`MAX_PLANES`]: super::view::MAX_PLANES
-    pub cut: Vec<Plane>,
-    /// The floor, with the shadow of solid meshes.
-    pub floor: Option<Floor>,
-    /// True where the background is left out: what nothing covers has no opacity.
-    pub transparent: bool,
-    /// Pixels that stand for one of a screen: widths and sizes in pixels are drawn so many times as large.
-    pub unit_px: f32,
-    /// True where what lies behind its neighbors or in a hollow is darkened (eye-dome lighting, ambient occlusion).
-    pub eye_dome: bool,
-    /// The camera is being moved: only so many points are drawn as [`SceneRenderer::moving_points`] allows.
-    pub moving: bool,
-}
-
-impl Default for SceneData {
-    fn default() -> Self {
-        Self {
-            background: [0.1, 0.11, 0.13],
-            clouds: vec![],
-            meshes: vec![],
-            lines: vec![],
-            cut: vec![],
-            floor: None,
-            transparent: false,
-            unit_px: 1.0,
-            eye_dome: false,
-            moving: false,
-        }
+with_defaults! {
+    /// Everything that one view shows. Cheap to make anew for every frame: the geometry is shared.
+    #[derive(Clone, Debug)]
+    pub struct SceneData {
+        /// sRGB, 0..1.
+        pub background: [f32; 3] = [0.1, 0.11, 0.13],
+        /// Point clouds, with different names.
+        pub clouds: Vec<CloudItem> = vec![],
+        /// Meshes, with different names.
+        pub meshes: Vec<MeshItem> = vec![],
+        /// Lines, with different names.
+        pub lines: Vec<LinesItem> = vec![],
+        /// The floor, with the shadow of solid meshes.
+        pub floor: Option<Floor> = None,
+        /// True where the background is left out: what nothing covers has no opacity.
+        pub transparent: bool = false,
+        /// Pixels that stand for one of a screen: widths and sizes in pixels are drawn so many times as large.
+        pub unit_px: f32 = 1.0,
+        /// True where what lies behind its neighbors or in a hollow is darkened (eye-dome lighting, ambient occlusion).
+        pub eye_dome: bool = false,
+        /// The camera is being moved: only so many points are drawn as [`SceneRenderer::moving_points`] allows.
+        pub moving: bool = false,
     }
 }
 
 impl SceneData {
-    /// The box around all finite points and meshes in the world, for [`Camera::fit`]; `None` if there are none.
+    /// The box around all finite points and meshes in the world; `None` if there are none.
     /// Walks all geometry: call it when a person asks, not at every frame.
     pub fn bounds(&self) -> Option<[DVec3; 2]> {
         let points =
@@ -172,22 +153,15 @@ impl SceneRenderer {
         self.counters
     }
 
-    /// Brings the picture in `target` up to date; returns whether it had to be drawn.
+    /// Brings the picture in `target`, which has the size of the part of the picture, up to date; returns whether it had to be
+    /// drawn.
     ///
     /// Does nothing at all if scene, camera and target are as they were at the last call. A target must not be drawn
     /// into by two renderers.
     ///
     /// # Errors
     /// [`GpuError::TooLarge`] and [`GpuError::Device`]; the next call starts afresh.
-    pub fn render(&mut self, gpu: &Gpu, scene: &SceneData, camera: &Camera, target: &Target) -> Result<bool, GpuError> {
-        self.render_part(gpu, scene, (camera, Part::whole(target.size())), target)
-    }
-
-    /// As [`Self::render`], a part of a larger picture: the target has the size of the part.
-    ///
-    /// # Errors
-    /// As [`Self::render`].
-    pub fn render_part(
+    pub fn render(
         &mut self,
         gpu: &Gpu,
         scene: &SceneData,
@@ -238,7 +212,7 @@ impl SceneRenderer {
     /// Sends what changed; returns whether anything did.
     fn update(&mut self, gpu: &Gpu, scene: &SceneData, camera: &Camera, part: Part) -> Result<bool, GpuError> {
         let mut done = Counters {
-            uniforms: u64::from(self.view.set(gpu, camera.uniform(part, &scene.cut, scene.unit_px))),
+            uniforms: u64::from(self.view.set(gpu, camera.uniform(part, scene.unit_px))),
             ..Counters::default()
         };
         let mut count = |[uploaded, written]: [bool; 2]| {
@@ -281,7 +255,8 @@ impl SceneRenderer {
         Ok(done != Counters::default())
     }
 
-    /// Draws the picture.
+    /// Draws the picture in passes, with the shading by depth between them: hollows in the meshes, which points would fill
+    /// with copies of themselves, then what lies behind its neighbors.
     fn draw(&mut self, gpu: &Gpu, shown: &Shown, target: &Target) {
         let label = Some("Scene::encoder");
         let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label });
@@ -294,41 +269,35 @@ impl SceneRenderer {
             };
             floor.throw(&mut encoder, &self.pipelines, &shown.casters, draw);
         }
-        self.draw_shaded(&mut encoder, shown, target);
+        let whole = Pass { clear: Some(shown.background), with_depth: true, last: true };
+        if let Some((_, depth)) = self.depth.as_ref().filter(|_| shown.eye_dome) {
+            let until = |layer: Layer| shown.order.partition_point(|(of, _)| *of < layer);
+            let (meshes, rest) = shown.order.split_at(until(Layer::Points));
+            let (points, over) = rest.split_at(until(Layer::Outline) - meshes.len());
+            self.draw_layers(&mut target.begin(&mut encoder, Pass { last: false, ..whole }), meshes);
+            let shade = |encoder: &mut wgpu::CommandEncoder, pipeline, last| {
+                let mut pass = target.begin(encoder, Pass { clear: None, with_depth: false, last });
+                pass.set_pipeline(pipeline);
+                pass.set_bind_group(0, &self.view_bindings, &[]);
+                pass.set_bind_group(1, depth, &[]);
+                pass.draw(0..6, 0..1);
+            };
+            // What moves is drawn without: nobody sees it.
+            if !shown.moving && meshes.iter().any(|(layer, _)| *layer == Layer::OpaqueMesh) {
+                shade(&mut encoder, &self.pipelines.hollows, false);
+            }
+            if !points.is_empty() {
+                self.draw_layers(&mut target.begin(&mut encoder, Pass { clear: None, last: false, ..whole }), points);
+            }
+            shade(&mut encoder, &self.pipelines.edl, over.is_empty());
+            if !over.is_empty() {
+                self.draw_layers(&mut target.begin(&mut encoder, Pass { clear: None, ..whole }), over);
+            }
+        } else {
+            self.draw_layers(&mut target.begin(&mut encoder, whole), &shown.order);
+        }
         gpu.queue.submit([encoder.finish()]);
         self.counters.renders += 1;
-    }
-
-    /// Draws everything in passes, with the shading by depth between them: hollows in the meshes, which points would fill
-    /// with copies of themselves, then what lies behind its neighbors.
-    fn draw_shaded(&self, encoder: &mut wgpu::CommandEncoder, shown: &Shown, target: &Target) {
-        let whole = Pass { clear: Some(shown.background), with_depth: true, last: true };
-        let Some(depth) = self.depth.as_ref().filter(|_| shown.eye_dome).map(|(_, depth)| depth) else {
-            return self.draw_layers(&mut target.begin(encoder, whole), &shown.order);
-        };
-        let until = |layer: Layer| shown.order.partition_point(|(of, _)| *of < layer);
-        let [points, over] = [until(Layer::Points), until(Layer::Outline)];
-        let (meshes, rest) = shown.order.split_at(points);
-        let (points, over) = rest.split_at(over - points);
-        self.draw_layers(&mut target.begin(encoder, Pass { last: false, ..whole }), meshes);
-        let shade = |encoder: &mut wgpu::CommandEncoder, pipeline, last| {
-            let mut pass = target.begin(encoder, Pass { clear: None, with_depth: false, last });
-            pass.set_pipeline(pipeline);
-            pass.set_bind_group(0, &self.view_bindings, &[]);
-            pass.set_bind_group(1, depth, &[]);
-            pass.draw(0..6, 0..1);
-        };
-        // What moves is drawn without: nobody sees it.
-        if !shown.moving && meshes.iter().any(|(layer, _)| *layer == Layer::OpaqueMesh) {
-            shade(encoder, &self.pipelines.hollows, false);
-        }
-        if !points.is_empty() {
-            self.draw_layers(&mut target.begin(encoder, Pass { clear: None, last: false, ..whole }), points);
-        }
-        shade(encoder, &self.pipelines.edl, over.is_empty());
-        if !over.is_empty() {
-            self.draw_layers(&mut target.begin(encoder, Pass { clear: None, ..whole }), over);
-        }
     }
 
     fn draw_layers(&self, pass: &mut wgpu::RenderPass<'_>, order: &[(Layer, String)]) {

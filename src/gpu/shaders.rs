@@ -78,10 +78,8 @@ mod tests {
                 up_in_world,
                 key_in_world,
                 depth,
-                planes,
                 size_px,
                 px_per_m,
-                plane_count,
                 unit_px,
             }
         );
@@ -89,22 +87,9 @@ mod tests {
         check_layout!(POINTS, points::PointVertex { position, payload });
         check_layout!(
             POINTS,
-            points::PointsUniform {
-                world_from_points,
-                color,
-                highlight,
-                lo,
-                hi,
-                size,
-                size_in_meters,
-                color_mode,
-                map,
-                stride,
-                drawn,
-                selected,
-            }
+            points::PointsUniform { world_from_points, color, lo, hi, size, size_in_meters, color_mode, map, stride }
         );
-        check_layout!(MESH, mesh::MeshUniform { world_from_mesh, color, xray, scalar, lo, hi, map, closed });
+        check_layout!(MESH, mesh::MeshUniform { world_from_mesh, color, xray, scalar, lo, hi, map });
         check_layout!(EDGES, edges::EdgeVertex { a, always, b, unused, normal_a, normal_b });
         check_layout!(EDGES, edges::EdgesUniform { world_from_mesh, color, width_px, creases, dash_px });
         check_layout!(LINES, lines::LineVertex { position, color });

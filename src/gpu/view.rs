@@ -8,6 +8,7 @@ use glam::{DAffine3, DMat4, DVec2, DVec3, DVec4, Vec3};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, PI};
 
+use touch2touch_core::frames::CameraPreset;
 use touch2touch_core::label::{Layers, Sight};
 
 /// Up on the screen, in world coordinates.
@@ -16,48 +17,6 @@ const UP: DVec3 = DVec3::NEG_Z;
 const DISTANCE: std::ops::RangeInclusive<f64> = 1e-4..=100.0;
 /// x of a point that is not finite; see `is_hidden` in `shaders/common/view.wgsl`.
 pub(super) const HIDDEN: f32 = f32::MAX;
-
-/// Yaw and pitch from which everything has a side to it, radians.
-const OBLIQUE: (f64, f64) = (0.9, 0.35);
-
-/// The sides from which a grasp is looked at.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, strum::EnumIter)]
-pub enum Preset {
-    /// From the left finger (negative x) along the closing axis.
-    Left,
-    /// From the right finger (positive x) along the closing axis.
-    Right,
-    /// Along the lateral axis, with the left finger on the left.
-    Front,
-    /// Along the lateral axis, with the left finger on the right.
-    Back,
-    /// From the wrist down the tool, with the left finger on the left.
-    Top,
-    /// From below up the tool, with the left finger on the left.
-    Bottom,
-    /// From above a corner, as a view begins.
-    Oblique,
-}
-
-impl Preset {
-    /// The name on buttons.
-    pub fn name(self) -> &'static str {
-        ["Left", "Right", "Front", "Back", "Top", "Bottom", "Oblique"][self as usize]
-    }
-
-    /// Yaw and pitch, radians.
-    fn angles(self) -> (f64, f64) {
-        match self {
-            Self::Left => (PI, 0.0),
-            Self::Right => (0.0, 0.0),
-            Self::Front => (FRAC_PI_2, 0.0),
-            Self::Back => (-FRAC_PI_2, 0.0),
-            Self::Top => (FRAC_PI_2, FRAC_PI_2),
-            Self::Bottom => (FRAC_PI_2, -FRAC_PI_2),
-            Self::Oblique => OBLIQUE,
-        }
-    }
-}
 
 /// A half line in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,33 +36,10 @@ impl Ray {
     }
 }
 
-/// Planes that can cut at a time.
-pub(crate) const MAX_PLANES: usize = 8;
 /// Nearest distance from the eye that is drawn, as a share of the distance to the target.
 const NEAR: f64 = 0.02;
 /// Depths of a parallel projection: so many distances to both sides of the target.
 const ORTHOGRAPHIC_REACH: f64 = 40.0;
-
-/// A plane that cuts a scene: what has `normal · p + offset_m < 0` is not drawn.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Plane {
-    /// Unit vector towards what stays, world.
-    pub normal: DVec3,
-    /// Meters.
-    pub offset_m: f64,
-}
-
-impl Plane {
-    /// The plane through a point (meters, world) that keeps the side of `normal`.
-    pub fn through(point: DVec3, normal: DVec3) -> Self {
-        Self { normal, offset_m: -normal.dot(point) }
-    }
-
-    /// Meters that a point lies on the side that stays.
-    pub fn height(&self, p: DVec3) -> f64 {
-        self.normal.dot(p) + self.offset_m
-    }
-}
 
 /// A rectangle of a picture: pictures larger than a texture are drawn in several.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -140,28 +76,23 @@ impl Part {
     }
 }
 
-/// A camera that looks at `target` from `distance`. Plain numbers, so that views can be linked and stored.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct Camera {
-    /// The point in the middle of the screen, meters, world.
-    pub target: DVec3,
-    /// From the eye to the target, meters.
-    pub distance: f64,
-    /// Direction of the eye seen from the target, radians about the vertical; 0 = positive x, growing towards y.
-    pub yaw_rad: f64,
-    /// Elevation of the eye over the horizontal plane, radians in -π/2..π/2; positive = from the wrist's side.
-    pub pitch_rad: f64,
-    /// Angle of view of the smaller side, radians: views of any shape show the same things.
-    pub fov_rad: f64,
-    /// Parallel projection of the same size at the target: lengths on the screen can be compared.
-    pub orthographic: bool,
-}
-
-impl Default for Camera {
-    fn default() -> Self {
-        let (yaw_rad, pitch_rad) = OBLIQUE;
-        Self { target: DVec3::ZERO, distance: 0.15, yaw_rad, pitch_rad, fov_rad: 0.6, orthographic: false }
+with_defaults! {
+    /// A camera that looks at `target` from `distance`. Plain numbers, so that views can be linked and stored.
+    #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(default)]
+    pub struct Camera {
+        /// The point in the middle of the screen, meters, world.
+        pub target: DVec3 = DVec3::ZERO,
+        /// From the eye to the target, meters.
+        pub distance: f64 = 0.15,
+        /// Direction of the eye seen from the target, radians about the vertical; 0 = positive x, growing towards y.
+        pub yaw_rad: f64 = CameraPreset::Oblique.angles_rad()[0],
+        /// Elevation of the eye over the horizontal plane, radians in -π/2..π/2; positive = from the wrist's side.
+        pub pitch_rad: f64 = CameraPreset::Oblique.angles_rad()[1],
+        /// Angle of view of the smaller side, radians: views of any shape show the same things.
+        pub fov_rad: f64 = 0.6,
+        /// Parallel projection of the same size at the target: lengths on the screen can be compared.
+        pub orthographic: bool = false,
     }
 }
 
@@ -208,23 +139,8 @@ impl Camera {
     }
 
     /// Turns to a side; target and distance stay.
-    pub fn look_from(&mut self, preset: Preset) {
-        (self.yaw_rad, self.pitch_rad) = preset.angles();
-    }
-
-    /// Moves so that the box `[smallest, largest]` (meters, world) fills the view from any side. Does nothing for a box
-    /// that is not finite.
-    pub fn fit(&mut self, bounds: [DVec3; 2], size: [u32; 2]) {
-        let [lo, hi] = bounds;
-        let radius = 0.5 * (hi - lo).length();
-        if !(lo.is_finite() && hi.is_finite() && radius.is_finite()) {
-            return;
-        }
-        self.target = 0.5 * (lo + hi);
-        // The rim of a sphere is seen in full where half the smaller side covers its angle; a pixel is left around it.
-        let side = f64::from(size[0].min(size[1]).max(4));
-        let angle = ((0.5 * self.fov_rad).tan() * (1.0 - 2.0 / side)).atan();
-        self.distance = (radius.max(1e-3) / angle.sin()).clamp(*DISTANCE.start(), *DISTANCE.end());
+    pub fn look_from(&mut self, preset: CameraPreset) {
+        [self.yaw_rad, self.pitch_rad] = preset.angles_rad();
     }
 
     /// Moves so that these points (meters, world) span `share` of the smaller side of the view from the present side, in
@@ -285,7 +201,7 @@ impl Camera {
     /// Projection of a point (meters, world): pixels from the upper left corner, and its distance in front of the eye
     /// in meters. `None` behind the eye and for a point that is not finite.
     pub fn project(&self, p_in_world: DVec3, size: [u32; 2]) -> Option<(DVec2, f64)> {
-        Projector::new(self, &DAffine3::IDENTITY, size).project(p_in_world)
+        Projector::new(self, size).project(p_in_world)
     }
 
     /// The ray through pixel position `px` (from the upper left corner; the middle of the first pixel is 0.5, 0.5).
@@ -309,14 +225,13 @@ impl Camera {
         (back + 0.55 * up - 0.45 * right).normalize()
     }
 
-    /// The picture of `size` pixels, cut open by planes, as what a mask is drawn on.
-    pub fn sight(&self, size: [u32; 2], layers: Layers, cut: &[Plane]) -> Sight {
-        let cut = cut.iter().take(MAX_PLANES).map(|plane| plane.normal.extend(plane.offset_m).as_vec4()).collect();
-        Sight { clip_from_grasp: self.clip_from_world(size).as_mat4(), size_px: size, layers, cut }
+    /// The picture of `size` pixels, as what a mask is drawn on.
+    pub fn sight(&self, size: [u32; 2], layers: Layers) -> Sight {
+        Sight { clip_from_grasp: self.clip_from_world(size).as_mat4(), size_px: size, layers }
     }
 
-    /// The camera for the device, with the first [`MAX_PLANES`] planes that cut; `unit_px` pixels are one of a screen.
-    pub(super) fn uniform(&self, part: Part, cut: &[Plane], unit_px: f32) -> ViewUniform {
+    /// The camera for the device; `unit_px` pixels are one of a screen.
+    pub(super) fn uniform(&self, part: Part, unit_px: f32) -> ViewUniform {
         let size = part.of;
         let [_, up, back] = self.axes();
         let eye = if self.orthographic { back.extend(0.0) } else { self.eye().extend(1.0) };
@@ -335,11 +250,7 @@ impl Camera {
             depth: depth.map(|v| v as f32),
             size_px: part.size.map(|s| s.max(1) as f32),
             px_per_m: (self.px_per_m(size) * at_one) as f32,
-            plane_count: cut.len().min(MAX_PLANES) as u32,
             unit_px: if unit_px.is_finite() { unit_px.max(0.01) } else { 1.0 },
-            planes: std::array::from_fn(|i| {
-                cut.get(i).map_or([0.0; 4], |plane| plane.normal.extend(plane.offset_m).as_vec4().to_array())
-            }),
         }
     }
 }
@@ -352,15 +263,13 @@ pub(super) struct Projector {
 }
 
 impl Projector {
-    /// For points in a frame that `world_from_points` maps to the world.
-    pub(super) fn new(camera: &Camera, world_from_points: &DAffine3, size: [u32; 2]) -> Self {
+    /// For points of the world.
+    pub(super) fn new(camera: &Camera, size: [u32; 2]) -> Self {
         let back = camera.axes()[2];
-        let world = DMat4::from(*world_from_points);
-        let row = (-back).extend(back.dot(camera.eye()));
         Self {
-            clip: camera.clip_from_world(size) * world,
+            clip: camera.clip_from_world(size),
             size: DVec2::new(f64::from(size[0].max(1)), f64::from(size[1].max(1))),
-            depth_row: world.transpose() * row,
+            depth_row: (-back).extend(back.dot(camera.eye())),
         }
     }
 
@@ -390,10 +299,8 @@ pub(super) struct ViewUniform {
     pub(super) up_in_world: [f32; 4],
     pub(super) key_in_world: [f32; 4],
     pub(super) depth: [f32; 4],
-    pub(super) planes: [[f32; 4]; MAX_PLANES],
     pub(super) size_px: [f32; 2],
     pub(super) px_per_m: f32,
-    pub(super) plane_count: u32,
     pub(super) unit_px: f32,
 }
 
@@ -417,7 +324,7 @@ mod tests {
     fn cameras() -> Vec<Camera> {
         let mut out = Vec::new();
         for orthographic in [false, true] {
-            for preset in [Preset::Left, Preset::Right, Preset::Front, Preset::Top] {
+            for preset in [CameraPreset::Left, CameraPreset::Right, CameraPreset::Front, CameraPreset::Top] {
                 let mut c = Camera { orthographic, target: DVec3::new(0.01, -0.02, 0.03), ..Camera::default() };
                 out.push(c);
                 c.look_from(preset);
@@ -443,7 +350,7 @@ mod tests {
     #[test]
     fn a_sight_shows_points_where_the_camera_does() {
         for camera in cameras() {
-            let sight = camera.sight(SIZE, Layers::Front, &[]);
+            let sight = camera.sight(SIZE, Layers::Front);
             for p in [DVec3::new(0.02, 0.01, 0.0), DVec3::new(-0.01, -0.03, 0.05), camera.target] {
                 let (px, _) = camera.project(p, SIZE).unwrap();
                 // There the middle of the first pixel is 0.5, here 0.
@@ -462,20 +369,25 @@ mod tests {
             c.project(p, SIZE).unwrap().0 - DVec2::new(400.0, 250.0)
         };
         let tip = DVec3::new(0.0, 0.0, 0.02);
-        for preset in [Preset::Left, Preset::Right, Preset::Front] {
+        for preset in [CameraPreset::Left, CameraPreset::Right, CameraPreset::Front] {
             assert!(on_screen(preset, tip).y > 10.0, "the tool hangs down from {preset:?}");
         }
         let left_finger = DVec3::new(-0.02, 0.0, 0.0);
-        assert!(on_screen(Preset::Front, left_finger).x < -10.0);
-        assert!(on_screen(Preset::Top, left_finger).x < -10.0);
+        assert!(on_screen(CameraPreset::Front, left_finger).x < -10.0);
+        assert!(on_screen(CameraPreset::Top, left_finger).x < -10.0);
         let eye = |preset| {
             let mut c = Camera::default();
             c.look_from(preset);
             c.eye()
         };
-        assert!(eye(Preset::Left).x < -0.1 && eye(Preset::Right).x > 0.1 && eye(Preset::Top).z < -0.1);
+        assert!(
+            eye(CameraPreset::Left).x < -0.1 && eye(CameraPreset::Right).x > 0.1 && eye(CameraPreset::Top).z < -0.1
+        );
         let lateral = DVec3::new(0.0, 0.01, 0.0);
-        assert!(on_screen(Preset::Left, lateral).x * on_screen(Preset::Right, lateral).x < 0.0, "they mirror");
+        assert!(
+            on_screen(CameraPreset::Left, lateral).x * on_screen(CameraPreset::Right, lateral).x < 0.0,
+            "they mirror"
+        );
     }
 
     #[test]
@@ -496,14 +408,14 @@ mod tests {
     }
 
     #[test]
-    fn fit_shows_the_whole_box_and_zoom_keeps_the_anchor() {
+    fn a_framed_box_is_shown_whole_and_zoom_keeps_the_anchor() {
         for mut camera in cameras() {
             for size in [[800, 500], [200, 700]] {
                 let bounds = [DVec3::new(-0.01, -0.03, 0.0), DVec3::new(0.01, 0.03, 0.09)];
-                camera.fit(bounds, size);
-                for i in 0..8 {
-                    let pick = |bit: usize, axis: usize| bounds[i >> bit & 1][axis];
-                    let corner = DVec3::new(pick(0, 0), pick(1, 1), pick(2, 2));
+                let pick = |i: usize, axis: usize| bounds[i >> axis & 1][axis];
+                let corners: Vec<DVec3> = (0..8).map(|i| DVec3::new(pick(i, 0), pick(i, 1), pick(i, 2))).collect();
+                camera.frame(&corners, 0.95);
+                for corner in corners {
                     let (px, _) = camera.project(corner, size).unwrap();
                     assert!(
                         px.x >= 0.0 && px.y >= 0.0 && px.x <= f64::from(size[0]) && px.y <= f64::from(size[1]),
@@ -543,7 +455,7 @@ mod tests {
         assert!(camera.is_valid());
         assert!(!Camera { distance: f64::NAN, ..camera }.is_valid());
         let mut same = camera;
-        same.fit([DVec3::NAN, DVec3::ONE], SIZE);
+        same.frame(&[DVec3::NAN], 0.9);
         same.zoom(0.0, None, SIZE);
         assert_eq!(same, camera);
         assert_eq!(position(DVec3::new(f64::NAN, 1.0, 1.0))[0], HIDDEN);

@@ -38,18 +38,13 @@ pub fn membrane(finger: &str, (revision, mesh): (u64, Arc<TriMesh>), color: [f32
         mesh,
         shading: Shading::Round,
         values: Arc::default(),
-        style: MeshStyle { color, opacity, look: Look::Veil, closed: false, ..MeshStyle::default() },
+        style: MeshStyle { color, opacity, look: Look::Veil, ..MeshStyle::default() },
     }
 }
 
 /// Contact points of one finger, in one color.
-pub fn contact(
-    finger: &str,
-    (revision, points): (u64, Arc<[DVec3]>),
-    color: [f32; 3],
-    (size, opacity): (PointSize, f32),
-) -> CloudItem {
-    let style = CloudStyle { color, size, opacity, ..CloudStyle::default() };
+pub fn contact(finger: &str, (revision, points): (u64, Arc<[DVec3]>), color: [f32; 3], size: PointSize) -> CloudItem {
+    let style = CloudStyle { color, size, ..CloudStyle::default() };
     CloudItem { name: format!("{CONTACT}{finger}"), revision, points, colors: PointColors::One, style }
 }
 

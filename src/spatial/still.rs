@@ -94,7 +94,7 @@ fn scene(pair: &InSpace, ground: Ground, distance_m: Option<f64>) -> SceneData {
         let color = if both { colors.side(side.source) } else { colors.contact };
         for (pad, points) in side.contact.entries() {
             let name = format!("{} {}", pair.rig.pad_key(pad), side.source.key());
-            let mut item = items::contact(&name, (0, points.clone()), color, (PointSize::Meters(POINT_M), 1.0));
+            let mut item = items::contact(&name, (0, points.clone()), color, PointSize::Meters(POINT_M));
             let values = side.deviation.as_ref().and_then(|found| found.points.get(pad));
             if let Some((values, reach)) = values.zip(distance_m) {
                 let colors = PointColors::Scalar(values.as_slice().into());
@@ -202,7 +202,7 @@ impl Stills {
                 let end: [u32; 2] = std::array::from_fn(|i| ([left, top][i] + inner + margin).min(whole[i]));
                 let part = Part { of: whole, at, size: [end[0] - at[0], end[1] - at[1]] };
                 target.resize(&self.gpu, part.size)?;
-                renderer.render_part(&self.gpu, &scene, (camera, part), &target)?;
+                renderer.render(&self.gpu, &scene, (camera, part), &target)?;
                 lay(&mut out, &target.read(&self.gpu)?, part, ([left, top], inner), fine);
             }
         }

@@ -9,5 +9,4 @@ pub(crate) mod pen;
 pub(crate) mod saved;
 pub(crate) mod scene_view;
 pub mod theme;
-pub(crate) mod thumbnail;
 pub mod widget;

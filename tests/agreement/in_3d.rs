@@ -14,7 +14,7 @@ const MEASURED: ImprintSource = ImprintSource::Measured;
 /// From the right finger's side (+x) along the closing axis, the wrist up, 200 mm across; parallel lines of sight.
 fn from_the_right(layers: Layers) -> Sight {
     let clip = Mat4::from_cols(Vec4::Z * 5.0, Vec4::NEG_X * 10.0, Vec4::NEG_Y * 10.0, Vec4::new(0.0, 0.0, 0.5, 1.0));
-    Sight { clip_from_grasp: clip, size_px: [600, 600], layers, cut: Vec::new() }
+    Sight { clip_from_grasp: clip, size_px: [600, 600], layers }
 }
 
 #[test]

@@ -7,12 +7,11 @@ use touch2touch::app::effect::TaskResult;
 use touch2touch::app::jobs::Worker;
 use touch2touch::app::keys::Preview;
 use touch2touch::app::keys::{ImprintSource, PredictionKey, Preset, Sampler, Spacing};
-use touch2touch::app::predict::Generate;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{GenerateSettings, ProposalSource};
 use touch2touch::app::state::{Absent, Lookup};
-use touch2touch::app::tasks::Ticket;
-use touch2touch::app::{recipe, results};
+use touch2touch::app::tasks::{TaskKind, Ticket};
+use touch2touch::app::{predict, recipe, results};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::grid::DepthMap;
@@ -76,8 +75,8 @@ fn the_pair_that_stays_on_screen_is_predicted_by_itself_where_that_costs_little(
     // On a machine that takes long for it nobody waits for what was not asked for.
     let slow = Prediction { seconds: 5.0, ..(**bench.state.results.predictions.get(&key).unwrap()).clone() };
     let keys: Vec<_> = bench.state.results.predictions.iter().map(|(key, _)| key.clone()).collect();
-    let slow = keys.into_iter().map(|key| (key, Arc::new(slow.clone()))).collect();
-    bench.send(Answer::TaskResult(Ticket(u64::MAX), TaskResult::of::<Generate>(slow)));
+    let slow: Vec<_> = keys.into_iter().map(|key| (key, Arc::new(slow.clone()))).collect();
+    bench.send(Answer::TaskResult(Ticket(u64::MAX), TaskResult::new(TaskKind::Generate, slow, predict::generated)));
     bench.send(panes(&[Pane::Predicted]));
     bench.settle();
     assert_eq!(bench.generated(), 2);

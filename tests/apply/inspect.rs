@@ -85,7 +85,7 @@ fn stepping_goes_both_ways_and_stops_at_the_ends() {
     send(&mut bench, InspectCommand::By(i64::MIN));
     assert_eq!(at(&bench), 0);
     // Playing from the end begins again, and ends by itself.
-    send(&mut bench, InspectCommand::End);
+    send(&mut bench, InspectCommand::END);
     act(&mut bench, Action::PlaySteps);
     assert!(bench.state.inspect.playing && at(&bench) == 0);
     for _ in 0..last {

@@ -2,7 +2,6 @@
 
 use super::*;
 use touch2touch::gpu::floor::Floor;
-use touch2touch::gpu::view::Part;
 use touch2touch::spatial::still::Stills;
 
 /// A floor 20 mm below the origin.
@@ -45,12 +44,12 @@ fn a_still_has_smooth_edges_and_parts_that_fit() {
     let pipelines = Arc::new(Pipelines::new(&gpu).unwrap());
     let mut renderer = SceneRenderer::new(&gpu, pipelines).unwrap();
     let whole = Target::new(&gpu, [120, 100]).unwrap();
-    renderer.render(&gpu, &data, &camera, &whole).unwrap();
+    renderer.render(&gpu, &data, (&camera, Part::whole(whole.size())), &whole).unwrap();
     let whole = whole.read(&gpu).unwrap();
     for at in [[0, 0], [60, 0], [0, 50], [60, 50]] {
         let target = Target::new(&gpu, [60, 50]).unwrap();
         let part = Part { of: [120, 100], at, size: [60, 50] };
-        renderer.render_part(&gpu, &data, (&camera, part), &target).unwrap();
+        renderer.render(&gpu, &data, (&camera, part), &target).unwrap();
         let quarter = target.read(&gpu).unwrap();
         let off = (0..50).flat_map(|y| (0..60).map(move |x| (x, y)));
         let off = off.filter(|(x, y)| quarter.rgb(*x, *y) != whole.rgb(x + at[0], y + at[1])).count();

@@ -99,7 +99,7 @@ fn keys_nudge_the_tool_accept_is_one_undoable_change_and_is_stored() {
     assert!(rig.model().workbench.hand.is_none());
     rig.press(Modifiers::NONE, Key::Z);
     assert_eq!(rig.model().workbench.tool, SceneTool::Pose);
-    let began = results::shown_pose(rig.model(), MEASURED).unwrap();
+    let began = results::manual_begins(rig.model(), MEASURED);
     for (modifiers, key, axis, by) in [
         (Modifiers::NONE, Key::ArrowRight, PoseAxis::Y, STEP_M),
         (Modifiers::SHIFT, Key::ArrowLeft, PoseAxis::Y, -10.0 * STEP_M),

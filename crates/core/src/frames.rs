@@ -7,8 +7,44 @@
 //!
 //! A transform is named `dst_from_src` and maps coordinates in `src` to coordinates in `dst`.
 
+use std::f64::consts::{FRAC_PI_2, PI};
+
 use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
+
+/// The sides from which a grasp is looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CameraPreset {
+    /// From the left finger (negative x) along the closing axis.
+    Left,
+    /// From the right finger (positive x) along the closing axis.
+    Right,
+    /// Along the lateral axis, with the left finger on the left.
+    Front,
+    /// Along the lateral axis, with the left finger on the right.
+    Back,
+    /// From the wrist down the tool, with the left finger on the left.
+    Top,
+    /// From below up the tool, with the left finger on the left.
+    Bottom,
+    /// From above a corner, as a view begins: everything has a side to it.
+    Oblique,
+}
+
+impl CameraPreset {
+    /// Yaw about the vertical from positive x towards y, and pitch over the horizontal plane, radians.
+    pub fn angles_rad(self) -> [f64; 2] {
+        match self {
+            Self::Left => [PI, 0.0],
+            Self::Right => [0.0, 0.0],
+            Self::Front => [FRAC_PI_2, 0.0],
+            Self::Back => [-FRAC_PI_2, 0.0],
+            Self::Top => [FRAC_PI_2, FRAC_PI_2],
+            Self::Bottom => [FRAC_PI_2, -FRAC_PI_2],
+            Self::Oblique => [0.9, 0.35],
+        }
+    }
+}
 
 /// A rigid motion in the y-z plane: rotate by `theta_rad` about +x, then move by `(0, y_m, z_m)`.
 ///

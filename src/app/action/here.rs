@@ -59,7 +59,7 @@ impl Action {
         use Action as A;
         let look = matches!(self, A::CameraLeft | A::CameraRight | A::CameraFront | A::CameraBack | A::CameraTop)
             || matches!(self, A::CameraBottom | A::CameraOblique | A::Distances | A::NextSides)
-            || matches!(self, A::WindowOnly | A::Parallel | A::NextLayer | A::BothClouds);
+            || matches!(self, A::Parallel | A::NextLayer | A::BothClouds);
         look || self.is_nudge()
             || matches!(self, A::PoseTool | A::IcpFromHere | A::Accept | A::RevertHand)
             || matches!(self, A::PlaySteps | A::PaintIn3d | A::PaintLayers)

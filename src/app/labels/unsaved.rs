@@ -8,7 +8,7 @@ use crate::app::effect::{Effect, NotSaved};
 use crate::app::keys::Revision;
 use crate::app::state::State;
 use crate::app::state::tasks::Level;
-use crate::app::state::view::UiRequest;
+use crate::app::state::view::{Purpose, UiRequest};
 use touch2touch_pipeline::error::TaskErrorKind;
 use touch2touch_pipeline::labels::{Operation, Unsaved};
 
@@ -48,7 +48,7 @@ pub(in crate::app) fn step(state: &mut State, command: UnsavedCommand, effects: 
             }
         }
         UnsavedCommand::Retry => retry(state, effects),
-        UnsavedCommand::AskFolder => effects.push(Effect::Ui(UiRequest::PickLabelsFolder)),
+        UnsavedCommand::AskFolder => effects.push(Effect::Ui(UiRequest::Pick(Purpose::Labels))),
         UnsavedCommand::Elsewhere(folder) => elsewhere(state, folder, effects),
     }
 }

@@ -78,17 +78,9 @@ fn side_of(subject: &Subject) -> Option<ImprintSource> {
     }
 }
 
-/// The recipes that a subject is made from by the settings.
-///
-/// # Errors
-/// Why it cannot be made.
-fn made_from(state: &State, subject: &Subject) -> Result<MadeFrom, Absent> {
-    subject.made_from(|named| recipe::of_generator(state, named))
-}
-
 /// The keys of the predictions that a subject of a touch is made of, and how they become meters; none of what is not made.
 fn made_for(state: &State, subject: &Subject, touch: TouchKey) -> Result<(Vec<PredictionKey>, ShiftMode), Absent> {
-    let recipes = match made_from(state, subject)? {
+    let recipes = match subject.made_from(|named| recipe::of_generator(state, named))? {
         MadeFrom::Measurement | MadeFrom::Picture => Vec::new(),
         MadeFrom::Prediction(recipe) => vec![recipe],
         MadeFrom::Mean(recipes) => recipes,
@@ -209,7 +201,9 @@ pub(crate) fn want_compared(wants: &mut Demands<'_>) {
         }
     }
     for finger in shown {
-        let with = |subject: &Subject| subject_key(state, subject, finger).ok().filter(|key| want_is_there(wants, key));
+        let with = |subject: &Subject| {
+            subject_key(state, subject, finger).ok().filter(|key| results::imprint_of(state, key).ready().is_some())
+        };
         let [a, b] = [&both[0], &both[1]].map(with);
         let measured = with(&Subject::Measured);
         for (a, b) in [(&a, &b), (&a, &measured), (&b, &measured)] {
@@ -227,10 +221,6 @@ pub(crate) fn want_compared(wants: &mut Demands<'_>) {
     for subject in &both {
         want_subject_place(wants, subject);
     }
-}
-
-pub(crate) fn want_is_there(wants: &Demands<'_>, key: &ImprintKey) -> bool {
-    results::imprint_of(wants.state, key).ready().is_some()
 }
 
 /// The imprint of a subject, and the predictions that it is made of.
@@ -255,7 +245,7 @@ pub(crate) fn want_subject(wants: &mut Demands<'_>, subject: &Subject, finger: P
                     wants.ask(meters);
                 } else {
                     whole = false;
-                    wants.ask_unless(state.tasks.generating(&recipe).is_some(), recipe);
+                    wants.ask(recipe);
                 }
             }
             if let ImprintKey::Mean(key) = key

@@ -242,7 +242,7 @@ pub(crate) fn registered(state: &State, key: &EstimateKey) -> Option<(Arc<Estima
     ))
 }
 
-/// Asks for what is needed of a side: its cloud (with `pose` that too) by one job, and the masks of these fingers.
+/// Asks for what is needed of a side: the tool and its cloud (with `pose` that too) by one job, and the masks of these fingers.
 pub(crate) fn want_side(
     wants: &mut Demands<'_>,
     source: ImprintSource,
@@ -250,30 +250,24 @@ pub(crate) fn want_side(
     masked: impl Fn(PadId) -> bool,
 ) {
     let state = wants.state;
+    let mut key = None;
     // While the pen is down the cloud would be out of date before it is there.
-    let key = (cloud && state.document.stroke.is_none()).then(|| want_cloud(wants, source, pose)).flatten();
+    if cloud && state.document.stroke.is_none() {
+        results::want_tool(wants);
+        if state.document.stored.contains_key(state.pair_name()) && !results::awaits_tool(state) {
+            let posed = pose_key(state, source).ok().flatten();
+            let posed = posed.filter(|_| pose && results::tool(state).ready().is_some());
+            key = posed.or_else(|| cloud_key(state, source).ok()?);
+            // Where a mask of it cannot be made each finger says why.
+            key = key.filter(|key| state.failure(key.clone()).is_none());
+        }
+    }
+    if let Some(key) = &key {
+        wants.ask(key.clone());
+    }
     for finger in state.rig().pads().filter(|finger| cloud || masked(*finger)) {
         if key.as_ref().is_none_or(|key| key.parts[finger].is_none()) {
             results::want_mask(wants, source, finger);
         }
     }
-}
-
-/// Asks for cloud and pose of an imprint and the tool; `None` where the cloud is not asked for.
-fn want_cloud(wants: &mut Demands<'_>, source: ImprintSource, pose: bool) -> Option<EstimateKey> {
-    let state = wants.state;
-    results::want_tool(wants);
-    if !state.document.stored.contains_key(state.pair_name()) || results::awaits_tool(state) {
-        return None;
-    }
-    let cloud = cloud_key(state, source).ok()??;
-    let posed = pose_key(state, source).ok().flatten();
-    let posed = posed.filter(|_| pose && results::tool(state).ready().is_some());
-    let key = posed.unwrap_or(cloud);
-    // A mask of it cannot be made: each finger says why.
-    if state.failure(key.clone()).is_some() {
-        return None;
-    }
-    wants.ask(key.clone());
-    Some(key)
 }

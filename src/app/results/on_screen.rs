@@ -15,20 +15,16 @@ pub(crate) fn shows_cloud(state: &State, source: ImprintSource) -> (bool, bool) 
     let both = state.workbench.both_clouds && state.shows_scene(other);
     let scene = both || state.shows_scene(source) || state.needs(Demand::Poses);
     let inspected = state.inspect.source == source && state.needs(Demand::Steps);
-    let scene = scene || proposes_at_pose(state, source);
-    (scene, scene || inspected)
+    // A proposal at the registered pose needs that of the imprint that is worked on.
+    let at_pose = proposes(state)
+        && state.settings.mask.proposal == ProposalSource::CadRegistered
+        && results::worked_on(state, state.selection.finger) == source;
+    (scene || at_pose, scene || at_pose || inspected)
 }
 
 /// True where a proposal is shown over the masks.
 pub fn proposes(state: &State) -> bool {
     state.selection.proposing && state.needs(Demand::Masks)
-}
-
-/// True where the proposal needs the pose of an imprint.
-pub(crate) fn proposes_at_pose(state: &State, source: ImprintSource) -> bool {
-    proposes(state)
-        && state.settings.mask.proposal == ProposalSource::CadRegistered
-        && results::worked_on(state, state.selection.finger) == source
 }
 
 /// The fingers whose prediction is looked at: those on screen, and both where a visible pane makes one cloud or

@@ -1,21 +1,24 @@
-//! Results about the whole data set: plans of exports, imports and trainings of masks, and the doctor's lines.
+//! Results about the whole data set: plans of exports, imports, trainings and evaluations, and the doctor's lines.
 
 use std::sync::Arc;
 
 use super::super::jobs::{Job, Worker};
-use super::super::keys::{AboutKey, ImportPlanKey, MaskPlanKey, Revision, TrainPlanKey};
+use super::super::keys::{AboutKey, ImportPlanKey, ImprintSource, MaskPlanKey, Revision, TrainPlanKey};
 use super::super::pane::Demand;
+use super::super::recipe;
 use super::super::results::{Computes, Demands};
 use super::super::services::Services;
 use super::super::state::State;
 use super::super::state::learn::Network;
 use super::super::state::tasks::TaskKind;
 use touch2touch_pipeline::doctor::{Fact, facts};
-use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::export::import::{Import, ImportSetup, plan_import};
 use touch2touch_pipeline::export::{DrawnMasks, ExportSetup, Plan, plan as plan_export};
 use touch2touch_pipeline::labels::Labels;
 use touch2touch_pipeline::learn::train::{TrainPlan, plan};
+use touch2touch_pipeline::scores::evaluate::Setup;
+use touch2touch_pipeline::steps::bundles::{BundleInfo, BundleKind};
+use touch2touch_pipeline::steps::recipe::Recipe;
 
 impl Computes for MaskPlanKey {
     fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Plan>> {
@@ -25,11 +28,6 @@ impl Computes for MaskPlanKey {
             let masks = DrawnMasks { labels: &Labels::of(&source.dataset), changed: &changed };
             plan_export(&source.dataset, &masks, &ExportSetup { pairs: None, choice })
         }))
-    }
-
-    /// The form says it.
-    fn failed(&self, _: &mut State, _: &touch2touch_pipeline::error::TaskError) -> bool {
-        false
     }
 }
 
@@ -51,11 +49,6 @@ impl Computes for ImportPlanKey {
         let source = state.library.open.as_ref()?.source.clone();
         let setup = import_setup(state)?;
         Some(Job::new(Worker::Files, "Plan of an import", move |cx| plan_import(&source.dataset, &setup, cx)))
-    }
-
-    /// The form says it.
-    fn failed(&self, _: &mut State, _: &TaskError) -> bool {
-        false
     }
 }
 
@@ -87,11 +80,6 @@ impl Computes for TrainPlanKey {
         Some(Job::new(Worker::Files, "Plan of a training", move |_| {
             plan(&source.dataset, &DrawnMasks { labels: &Labels::of(&source.dataset), changed: &changed }, choice)
         }))
-    }
-
-    /// The pane says it.
-    fn failed(&self, _: &mut State, _: &TaskError) -> bool {
-        false
     }
 }
 
@@ -141,4 +129,27 @@ pub(crate) fn want_doctor(wants: &mut Demands<'_>) {
     {
         wants.ask(key);
     }
+}
+
+/// The generators for the sensors of the data, and whether each gets a row.
+pub fn evaluated(state: &State) -> impl Iterator<Item = (&BundleInfo, bool)> {
+    let rig = state.rig();
+    state
+        .library
+        .bundles
+        .iter()
+        .filter(move |b| b.kind == BundleKind::Generator && b.fits(&rig))
+        .map(|b| (b, !state.table.left_out.contains(&b.id)))
+}
+
+/// The setup of an evaluation started now; `None` without data or with nothing to score.
+pub(crate) fn evaluation_setup(state: &State) -> Option<Setup> {
+    state.library.open.as_ref()?;
+    let bundles: Vec<_> = evaluated(state).filter(|(_, chosen)| *chosen).map(|(b, _)| b.origin.clone()).collect();
+    (!bundles.is_empty()).then(|| Setup {
+        bundles,
+        classifier: recipe::bundle(state, BundleKind::Classifier).ok().map(|b| b.origin.clone()),
+        recipe: Recipe { generator: None, ..recipe::in_force(state, ImprintSource::Measured) },
+        ..Setup::default()
+    })
 }

@@ -1,14 +1,14 @@
-//! Raw predictions: those kept on the disk, those that a pane needs, and those of the pair on screen that cost little.
+//! Raw predictions: those kept on the disk, those that a pane needs, and those of the pair on screen that cost little; and
+//! pictures of them on the way.
 
 use std::collections::BTreeSet;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::super::jobs::{Job, Worker};
-use super::super::keys::{ImprintSource, Keyed, PredictionKey, StoredKey, TouchKey};
+use super::super::keys::{ImprintSource, Keyed, PredictionKey, Preview, ShiftMode, StoredKey, TouchKey};
 use super::super::pane::Demand;
 use super::super::recipe;
-use super::super::results::preview::Onlooker;
 use super::super::results::{self, Computes, Demands};
 use super::super::services::Services;
 use super::super::source::Source;
@@ -17,7 +17,7 @@ use super::super::state::{Absent, State};
 use touch2touch_core::rig::{PadId, SensorId};
 use touch2touch_core::sample::Sample;
 use touch2touch_pipeline::error::TaskError;
-use touch2touch_pipeline::job::JobCx;
+use touch2touch_pipeline::job::{JobCx, PreviewPicture, Previews};
 use touch2touch_pipeline::steps::bundles::{BundleInfo, BundleKind};
 use touch2touch_pipeline::steps::models::KeptPrediction;
 use touch2touch_pipeline::steps::predict::Generating;
@@ -48,6 +48,11 @@ impl Computes for PredictionKey {
         }))
     }
 
+    /// What a person started is not made twice.
+    fn is_there(&self, state: &State) -> bool {
+        state.tasks.generating(self).is_some()
+    }
+
     /// One that is only compared with something does not push away what is looked at.
     fn arrived(&self, state: &mut State, _: &Arc<Prediction>) {
         let named = recipe::prediction(state, self.touch).as_ref() == Some(self);
@@ -76,6 +81,10 @@ impl Computes for StoredKey {
             };
             Ok(kept.map(keyed).collect())
         }))
+    }
+
+    fn is_there(&self, state: &State) -> bool {
+        state.results.looked_up.contains(&self.0)
     }
 
     /// Shows the one used last where the settings name none of them, unless something is shown already.
@@ -127,9 +136,8 @@ pub(crate) fn generate(
 
 /// Asks for the predictions of a touch that were made before this start of the program.
 pub(crate) fn want_stored(wants: &mut Demands<'_>, finger: PadId, touch: TouchKey) {
-    let state = wants.state;
-    if results::can_start(state, finger) {
-        wants.ask_unless(state.results.looked_up.contains(&touch), StoredKey(touch));
+    if results::can_start(wants.state, finger) {
+        wants.ask(StoredKey(touch));
     }
 }
 
@@ -143,8 +151,7 @@ pub(crate) fn want_other_finger(wants: &mut Demands<'_>, finger: PadId) {
     if !state.settings.generate.both_fingers || !looked_up || state.results.predictions.contains(&recipe) {
         return;
     }
-    let under_way = state.tasks.generating(&recipe).is_some();
-    if state.library.bundle(&recipe.bundle).is_some() && results::can_start(state, finger) && !under_way {
+    if state.library.bundle(&recipe.bundle).is_some() && results::can_start(state, finger) {
         wants.ask(recipe);
     }
 }
@@ -216,4 +223,74 @@ pub(crate) fn want_predictions_ahead(wants: &mut Demands<'_>) {
     for key in fingers.into_iter().filter_map(|finger| prefetch(wants.state, finger)) {
         wants.ask(key);
     }
+}
+
+/// Receives pictures on the way.
+pub(crate) type PreviewSink = Arc<dyn Fn(Preview) + Send + Sync>;
+
+/// The pictures of predictions under way that would be looked at now. The runtime keeps this up to date while jobs run.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct PreviewRequest {
+    /// After so many steps, and after the first; 0 = never.
+    pub every: u32,
+    /// The mapping to meters.
+    pub shift: ShiftMode,
+    /// The touches whose predicted imprint is on screen.
+    pub touches: BTreeSet<TouchKey>,
+}
+
+impl PreviewRequest {
+    /// True where a picture of `touch` is wanted after `step` steps.
+    pub fn wants(&self, touch: TouchKey, step: u32) -> bool {
+        self.every > 0 && (step == 1 || step.is_multiple_of(self.every)) && self.touches.contains(&touch)
+    }
+}
+
+/// Who looks at the pictures of predictions on the way, whichever they are.
+#[derive(Clone)]
+pub struct Onlooker {
+    /// The pictures that would be looked at now.
+    pub request: Arc<Mutex<PreviewRequest>>,
+    /// Receives it.
+    pub sink: PreviewSink,
+}
+
+impl Onlooker {
+    /// The onlooker of the predictions of one call, in its order.
+    pub fn of(self, items: Vec<PredictionKey>) -> Arc<dyn Previews> {
+        Arc::new(Watched { by: self, items })
+    }
+}
+
+struct Watched {
+    by: Onlooker,
+    items: Vec<PredictionKey>,
+}
+
+impl Previews for Watched {
+    fn wants(&self, item: usize, step: u32) -> Option<ShiftMode> {
+        let request = self.by.request.lock().unwrap_or_else(PoisonError::into_inner);
+        request.wants(self.items.get(item)?.touch, step).then_some(request.shift)
+    }
+
+    fn show(&self, item: usize, picture: PreviewPicture) {
+        if let Some(recipe) = self.items.get(item).cloned() {
+            (self.by.sink)(Preview { recipe, picture });
+        }
+    }
+}
+
+/// The prediction on its way to one finger of the selected pair, as it looks now.
+pub fn preview(state: &State, finger: PadId) -> Option<&Arc<Preview>> {
+    state.results.previews.get(&state.touch_key(finger)?).filter(|_| state.document.stroke.is_none())
+}
+
+/// The pictures of predictions under way that would be looked at: the predicted imprints on screen, unless a pen is on them.
+pub fn preview_request(state: &State) -> PreviewRequest {
+    let shown = state.needs(Demand::Imprint(ImprintSource::Predicted)) && state.document.stroke.is_none();
+    let touches = match state.pair_key().filter(|_| shown) {
+        Some(pair) => state.fingers().into_iter().map(|finger| pair.finger(finger)).collect(),
+        None => Default::default(),
+    };
+    PreviewRequest { every: state.settings.generate.preview_every, shift: state.settings.shift, touches }
 }

@@ -29,11 +29,7 @@ fn cad_pose(state: &State, place: &CadPlace, pair: PairKey) -> Option<(CadPose, 
             let pose = results::pose_of(state, key)?.grasp_from_object;
             (CadPose::Registered(pose), pose)
         }
-        CadPlace::Hand(bits) => {
-            let [theta_rad, y_m, z_m] = bits.map(f64::from_bits);
-            let pose = PlanarPose { theta_rad, y_m, z_m };
-            (CadPose::Nudged(pose), pose)
-        }
+        CadPlace::Hand(bits) => (CadPose::Nudged(bits.get()), bits.get()),
     })
 }
 
@@ -110,7 +106,7 @@ pub fn proposal_key(state: &State, source: ImprintSource, finger: PadId) -> Resu
             results::tool_name(state)?;
             let held = state.workbench.hand(source).map(|hand| hand.pose);
             let pose = hand_pose(held, results::accepted(state, source)).ok_or(Absent::NoHandPose)?;
-            ProposalInputs::Cad(CadPlace::hand(pose), within)
+            ProposalInputs::Cad(CadPlace::Hand(pose.into()), within)
         }
         ProposalSource::Grow => {
             let hand = results::drawn_mask(state, source, finger).filter(|hand| hand.marks.has_hand_work());

@@ -1,20 +1,24 @@
-//! Results about a registration: recorded runs, their steps and layers, distances to the model, other tools.
+//! Results about a registration: recorded runs, their steps and layers, distances to the model, other tools; and poses
+//! that a person set, accepted, or starts from.
 
 use std::sync::Arc;
 
 use strum::IntoEnumIterator as _;
 
 use super::super::jobs::{Job, Worker};
-use super::super::keys::{DeviationKey, ImprintSource, Inspection, LayersKey, PoseBits, RankingKey, RunKey, ToolKey};
-use super::super::results;
-use super::super::results::{Computes, Demands};
+use super::super::keys::{DeviationKey, ImprintSource, LayersKey, PoseBits, RankingKey, RunKey, ToolKey};
+use super::super::results::{self, Computes, Demands};
 use super::super::services::Services;
-use super::super::state::inspect::Inspected;
+use super::super::state::inspect::{Inspected, Inspection};
 use super::super::state::{Absent, Lookup, State};
 use touch2touch_core::align::Ask;
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::manual::{AcceptedPose, PoseDifference};
 use touch2touch_core::which_tool::Candidate;
 use touch2touch_pipeline::compare::deviation::{self, Deviation};
 use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::labels::ImprintOf;
+use touch2touch_pipeline::masks::propose::hand_pose;
 use touch2touch_pipeline::steps::layers::{self, LayerResult};
 use touch2touch_pipeline::steps::tool::{NamedTool, named_tool, tool_file};
 
@@ -180,4 +184,42 @@ fn ranking_key(state: &State, source: ImprintSource) -> Option<RankingKey> {
 pub fn ranking(state: &State, source: ImprintSource) -> Option<Lookup<'_, Vec<Candidate>>> {
     let key = ranking_key(state, source)?;
     Some(state.look_or(Ok(Some(key)), || None).value())
+}
+
+/// The imprint that a pose is made from, where all fingers show the same.
+pub(crate) fn shown_imprint(state: &State, source: ImprintSource) -> Option<ImprintOf> {
+    let rig = state.rig();
+    let mut of = rig.pads().filter_map(|pad| results::mask_place(state, source, pad)).map(|place| place.of);
+    let first = of.next()?;
+    of.all(|other| other == first).then_some(first)
+}
+
+/// The pose that was accepted of the imprint of the selected pair that is shown.
+pub fn accepted(state: &State, source: ImprintSource) -> Option<AcceptedPose> {
+    state.document.pair(state.pair_name())?.accepted(&shown_imprint(state, source)?)
+}
+
+/// The other predictions of the selected pair that a pose was accepted of.
+pub fn accepted_elsewhere(state: &State) -> Vec<&ImprintOf> {
+    let shown = shown_imprint(state, ImprintSource::Predicted);
+    let poses = state.document.pair(state.pair_name()).map(|labels| labels.accepted.keys());
+    let other = |of: &&ImprintOf| of.source() == ImprintSource::Predicted && **of != ImprintOf::unknown();
+    poses.into_iter().flatten().filter(other).filter(|of| Some(*of) != shown.as_ref()).collect()
+}
+
+/// The pose that a person set and accepted.
+pub fn by_hand(state: &State, source: ImprintSource) -> Option<PlanarPose> {
+    hand_pose(None, accepted(state, source))
+}
+
+/// The pose at which setting one by hand begins.
+pub fn manual_begins(state: &State, source: ImprintSource) -> PlanarPose {
+    let accepted = accepted(state, source).map(|a| a.pose);
+    accepted.or_else(|| Some(results::pose(state, source).shown()?.grasp_from_object)).unwrap_or_default()
+}
+
+/// The difference between the registered poses of measurement and prediction, where both are there.
+pub(crate) fn sides_apart(state: &State) -> Option<PoseDifference> {
+    let pose = |source| Some(results::pose(state, source).ready()?.grasp_from_object);
+    Some(PoseDifference::between(pose(ImprintSource::Measured)?, pose(ImprintSource::Predicted)?))
 }

@@ -1,12 +1,15 @@
-//! The tensors of a pair, and its small picture.
+//! What is read of a pair: its tensors, its small picture, its labels, the CAD model of its tool.
 
 use std::sync::Arc;
 
 use super::super::jobs::{Job, Worker};
-use super::super::keys::{PairKey, ThumbnailKey};
+use super::super::keys::Read;
+use super::super::keys::{LabelsKey, PairKey, ThumbnailKey, ToolKey};
 use super::super::pane::Demand;
 use super::super::results::{Computes, Demands};
 use super::super::services::Services;
+use super::super::state::labels::Stored;
+use super::super::state::tasks::Level;
 use super::super::state::{Absent, Lookup, State};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::frames::PlanarPose;
@@ -15,6 +18,7 @@ use touch2touch_core::rig::PadId;
 use touch2touch_core::sample::{ColorTouch, DepthTouch, PadTouch, Sample};
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::steps::imprint;
+use touch2touch_pipeline::steps::tool::{NamedTool, named_tool, tool_file};
 
 impl Computes for PairKey {
     fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Sample>> {
@@ -92,5 +96,95 @@ pub(crate) fn want_thumbnails(wants: &mut Demands<'_>) {
     let start = state.library.rows.start.min(end);
     for pair in &state.library.order[start..end] {
         wants.ask(ThumbnailKey(open.key(*pair)));
+    }
+}
+
+/// The name of the pair.
+fn name(state: &State, key: &LabelsKey) -> Option<String> {
+    Some(state.library.entry(key.0.pair)?.name.clone())
+}
+
+impl Computes for LabelsKey {
+    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Read>> {
+        let (source, name) = (state.library.open.as_ref()?.source.clone(), name(state, self)?);
+        Some(Job::new(Worker::Files, format!("Labels of {name}"), move |_| {
+            let labels = source.labels.load(&name)?;
+            let told = source.labels.past(&name, &labels);
+            Ok(Read { labels, told })
+        }))
+    }
+
+    /// They go to the document.
+    fn is_there(&self, state: &State) -> bool {
+        name(state, self).is_some_and(|name| state.document.stored.contains_key(&name))
+    }
+
+    fn arrived(&self, state: &mut State, read: &Arc<Read>) {
+        let Some(name) = name(state, self) else { return };
+        let doc = &mut state.document;
+        if doc.stored.insert(name.clone(), Stored::Loaded) == Some(Stored::Loaded) {
+            // Read twice: what is here may be newer.
+            return;
+        }
+        let mut labels = read.labels.clone();
+        for hand in labels.masks.values_mut() {
+            hand.revision = doc.next_revision();
+        }
+        let (review, note) = (labels.review, labels.note.clone());
+        doc.labels.insert(name.clone(), labels);
+        doc.set_review(&name, review);
+        doc.set_note(&name, note);
+        state.history.restore(&name, &read.told.done, &read.told.undone);
+        if let Some(problem) = &read.told.problem {
+            let (why, hint) = (problem.why.clone(), problem.hint.clone());
+            state.log.push(Level::Warning, problem.what.clone(), Some(why), hint);
+        }
+    }
+
+    fn failed(&self, state: &mut State, err: &TaskError) -> bool {
+        if let Some(name) = name(state, self) {
+            state.document.stored.insert(name, Stored::Blocked(err.clone()));
+        }
+        true
+    }
+}
+
+impl Computes for ToolKey {
+    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<NamedTool>> {
+        let (source, name) = (state.library.open.as_ref()?.source.clone(), self.name.clone());
+        let what = format!("CAD model of {name}");
+        Some(Job::new(Worker::Compute, what, move |_| named_tool(&name, tool_file(&source.dataset, &name)?.mesh)))
+    }
+
+    fn failed(&self, _: &mut State, _: &TaskError) -> bool {
+        true
+    }
+}
+
+/// The tool of the selected pair.
+///
+/// # Errors
+/// [`Absent::NothingSelected`], [`Absent::NoTool`].
+pub fn tool_name(state: &State) -> Result<&str, Absent> {
+    state.entry().ok_or(Absent::NothingSelected)?.tool.as_deref().ok_or(Absent::NoTool)
+}
+
+/// The key of the tool of the selected pair.
+///
+/// # Errors
+/// Why there can be none.
+pub(crate) fn tool_key(state: &State) -> Result<ToolKey, Absent> {
+    let dataset = state.library.open.as_ref().ok_or(Absent::NothingOpen)?.seq;
+    Ok(ToolKey { dataset, name: tool_name(state)?.into() })
+}
+
+/// The tool of the selected pair, with its CAD model.
+pub fn tool(state: &State) -> Lookup<'_, NamedTool> {
+    state.look_or(tool_key(state).map(Some), || None).value()
+}
+
+pub(crate) fn want_tool(wants: &mut Demands<'_>) {
+    if let Ok(key) = tool_key(wants.state) {
+        wants.ask(key);
     }
 }

@@ -7,7 +7,7 @@ use super::super::answers::Answer;
 use super::super::effect::{Access, Effect, LabelsToSave, NotSaved, TaskJob};
 use super::super::jobs::{Body, Worker};
 use super::super::keys::Preview;
-use super::super::results::preview::{Onlooker, PreviewSink};
+use super::super::results::prediction::{Onlooker, PreviewSink};
 use super::super::source::Source;
 use super::super::state::labels::Merged;
 use super::super::state::tasks::Ticket;

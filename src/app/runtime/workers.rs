@@ -126,12 +126,17 @@ impl Workers {
         wanted: &[Request],
         mut prepare: impl FnMut(&Request) -> Option<(DatasetSeq, jobs::Job<Computed>)>,
     ) {
-        let started: BTreeSet<Request> = self
-            .workers
-            .iter()
-            .flat_map(|state| lock(&state.queue).started.keys().cloned().collect::<Vec<_>>())
-            .collect();
-        if wanted == self.demanded && started.iter().all(|r| wanted.contains(r)) && self.all_placed(wanted, &started) {
+        let (mut started, mut placed) = (BTreeSet::new(), BTreeSet::new());
+        for state in &self.workers {
+            let queue = lock(&state.queue);
+            started.extend(queue.started.keys().cloned());
+            placed.extend(queue.demanded.iter().filter_map(|job| match &job.id {
+                JobId::Request(request) => Some(request.clone()),
+                _ => None,
+            }));
+        }
+        let is_placed = |request: &Request| started.contains(request) || placed.contains(request);
+        if wanted == self.demanded && started.iter().all(|r| wanted.contains(r)) && wanted.iter().all(is_placed) {
             return;
         }
         // What runs for nobody is told to stop; what cannot stop ends and lands under its key.
@@ -162,23 +167,6 @@ impl Workers {
             state.filled.notify_all();
         }
         self.demanded = wanted.to_vec();
-    }
-
-    /// True where everything wanted runs or waits already.
-    fn all_placed(&self, wanted: &[Request], started: &BTreeSet<Request>) -> bool {
-        let waiting: BTreeSet<Request> = self
-            .workers
-            .iter()
-            .flat_map(|state| {
-                let queue = lock(&state.queue);
-                let ids = queue.demanded.iter().filter_map(|job| match &job.id {
-                    JobId::Request(request) => Some(request.clone()),
-                    _ => None,
-                });
-                ids.collect::<Vec<_>>()
-            })
-            .collect();
-        wanted.iter().all(|request| started.contains(request) || waiting.contains(request))
     }
 
     /// The answer of a job was handled.

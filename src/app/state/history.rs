@@ -34,8 +34,6 @@ impl KeptMask {
 pub enum Edit {
     /// Replaces a corrected mask; `None` = the automatic source is in force.
     Mask {
-        /// The pair's name.
-        pair: String,
         /// The place of the mask.
         place: MaskPlace,
         /// The mask.
@@ -43,22 +41,16 @@ pub enum Edit {
     },
     /// Replaces the review state.
     Review {
-        /// The pair's name.
-        pair: String,
         /// The state.
         review: Review,
     },
     /// Replaces the note.
     Note {
-        /// The pair's name.
-        pair: String,
         /// The text.
         note: String,
     },
     /// Replaces the accepted pose.
     Pose {
-        /// The pair's name.
-        pair: String,
         /// The imprint it was made from.
         of: ImprintOf,
         /// `grasp_from_object`.
@@ -68,27 +60,18 @@ pub enum Edit {
 
 impl Edit {
     /// Exchanges the value held here with the one in `doc`; afterwards `self` is the inverse edit.
-    pub fn swap(&mut self, doc: &mut Document) {
+    fn swap(&mut self, doc: &mut Document, pair: &str) {
         match self {
-            Self::Mask { pair, place, mask } => {
+            Self::Mask { place, mask } => {
                 let new = mask.take().and_then(|kept| kept.unpack(doc));
-                let labels = doc.labels.entry(pair.clone()).or_default();
+                let labels = doc.labels.entry(pair.to_owned()).or_default();
                 *mask = labels.put(place, new).as_ref().map(KeptMask::of);
             }
-            Self::Review { pair, review } => *review = doc.set_review(pair, *review),
-            Self::Note { pair, note } => *note = doc.set_note(pair, std::mem::take(note)),
-            Self::Pose { pair, of, pose } => {
-                let labels = doc.labels.entry(pair.clone()).or_default();
+            Self::Review { review } => *review = doc.set_review(pair, *review),
+            Self::Note { note } => *note = doc.set_note(pair, std::mem::take(note)),
+            Self::Pose { of, pose } => {
+                let labels = doc.labels.entry(pair.to_owned()).or_default();
                 *pose = labels.accept(of, pose.take());
-            }
-        }
-    }
-
-    /// The pair's name.
-    pub fn pair(&self) -> &str {
-        match self {
-            Self::Mask { pair, .. } | Self::Review { pair, .. } | Self::Note { pair, .. } | Self::Pose { pair, .. } => {
-                pair
             }
         }
     }
@@ -114,9 +97,11 @@ impl Edit {
 /// The changes of one gesture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gesture {
+    /// The pair's name.
+    pub pair: String,
     /// The name of what it did, e.g. `brush stroke`: shown when it is undone.
     pub name: Cow<'static, str>,
-    /// The changes in the order they were made. All concern the same pair.
+    /// The changes in the order they were made.
     pub edits: Vec<Edit>,
 }
 
@@ -129,39 +114,30 @@ impl Gesture {
         change: &Change,
         revision: Option<Revision>,
     ) -> Self {
-        let pair = || pair.to_owned();
         let mut edits = Vec::new();
         for (place, [_, after]) in &change.masks {
             let mask = after.as_ref().map(|hand| KeptMask { packed: hand.pack(), revision });
-            edits.push(Edit::Mask { pair: pair(), place: place.clone(), mask });
+            edits.push(Edit::Mask { place: place.clone(), mask });
         }
-        edits.extend(change.review.map(|[_, after]| Edit::Review { pair: pair(), review: after }));
-        edits.extend(change.note.as_ref().map(|[_, after]| Edit::Note { pair: pair(), note: after.clone() }));
+        edits.extend(change.review.map(|[_, after]| Edit::Review { review: after }));
+        edits.extend(change.note.as_ref().map(|[_, after]| Edit::Note { note: after.clone() }));
         for (of, [_, after]) in &change.accepted {
-            edits.push(Edit::Pose { pair: pair(), of: of.clone(), pose: *after });
+            edits.push(Edit::Pose { of: of.clone(), pose: *after });
         }
-        Self { name, edits }
-    }
-
-    /// The pair's name.
-    pub fn pair(&self) -> &str {
-        self.edits.first().map_or("", Edit::pair)
+        Self { pair: pair.to_owned(), name, edits }
     }
 
     /// True where everything it changes is on screen.
     fn is_on_screen(&self, pair: &str, shown: &[MaskPlace]) -> bool {
-        self.edits.iter().all(|e| e.pair() == pair && e.place().is_none_or(|place| shown.contains(place)))
+        self.pair == pair && self.edits.iter().all(|e| e.place().is_none_or(|place| shown.contains(place)))
     }
 
     /// True where undoing one before the other would matter.
     fn overlaps(&self, other: &Gesture) -> bool {
-        self.edits.iter().any(|a| {
-            other.edits.iter().any(|b| {
-                a.pair() == b.pair()
-                    && a.place() == b.place()
-                    && (a.place().is_some() || std::mem::discriminant(a) == std::mem::discriminant(b))
-            })
-        })
+        let same = |a: &Edit, b: &Edit| {
+            a.place() == b.place() && (a.place().is_some() || std::mem::discriminant(a) == std::mem::discriminant(b))
+        };
+        self.pair == other.pair && self.edits.iter().any(|a| other.edits.iter().any(|b| same(a, b)))
     }
 
     fn bytes(&self) -> usize {
@@ -206,13 +182,13 @@ impl History {
 
     /// Does what a gesture says, and records it.
     pub(in crate::app) fn make(&mut self, doc: &mut Document, mut gesture: Gesture) {
-        gesture.edits.iter_mut().for_each(|edit| edit.swap(doc));
+        gesture.edits.iter_mut().for_each(|edit| edit.swap(doc, &gesture.pair));
         self.record(gesture);
     }
 
     /// Takes in what was done to a pair, and taken back, before its labels were read.
     pub(crate) fn restore(&mut self, pair: &str, done: &[Past], undone: &[Past]) {
-        if self.done.iter().chain(&self.undone).any(|gesture| gesture.pair() == pair) {
+        if self.done.iter().chain(&self.undone).any(|gesture| gesture.pair == pair) {
             return;
         }
         let forth = |past: &Past| Gesture::forth(pair, past.name.clone(), &past.change, None);
@@ -232,20 +208,26 @@ impl History {
 
     /// Takes back the last gesture on screen. Returns what it did.
     pub fn undo(&mut self, doc: &mut Document, pair: &str, shown: &[MaskPlace]) -> Option<&Gesture> {
-        let at = Self::position(&self.done, pair, shown)?;
-        let mut gesture = self.done.remove(at);
-        gesture.edits.iter_mut().rev().for_each(|edit| edit.swap(doc));
-        self.undone.push(gesture);
-        self.undone.last()
+        Self::travel([&mut self.done, &mut self.undone], doc, pair, shown)
     }
 
     /// Does the last gesture taken back on screen again. Returns what it did.
     pub fn redo(&mut self, doc: &mut Document, pair: &str, shown: &[MaskPlace]) -> Option<&Gesture> {
-        let at = Self::position(&self.undone, pair, shown)?;
-        let mut gesture = self.undone.remove(at);
-        gesture.edits.iter_mut().for_each(|edit| edit.swap(doc));
-        self.done.push(gesture);
-        self.done.last()
+        Self::travel([&mut self.undone, &mut self.done], doc, pair, shown)
+    }
+
+    /// Takes the last gesture on screen from one list to the other; the last change of it goes first.
+    fn travel<'a>(
+        [from, to]: [&'a mut Vec<Gesture>; 2],
+        doc: &mut Document,
+        pair: &str,
+        shown: &[MaskPlace],
+    ) -> Option<&'a Gesture> {
+        let mut gesture = from.remove(Self::position(from, pair, shown)?);
+        gesture.edits.reverse();
+        gesture.edits.iter_mut().for_each(|edit| edit.swap(doc, &gesture.pair));
+        to.push(gesture);
+        to.last()
     }
 
     /// The gestures that can be taken back, the oldest first.
@@ -265,8 +247,8 @@ impl History {
 
     /// Forgets what was done to a pair: it is shown as another one from now on.
     pub fn forget(&mut self, pair: &str) {
-        self.done.retain(|gesture| gesture.pair() != pair);
-        self.undone.retain(|gesture| gesture.pair() != pair);
+        self.done.retain(|gesture| gesture.pair != pair);
+        self.undone.retain(|gesture| gesture.pair != pair);
     }
 
     /// Forgets everything: another data set is open.
@@ -298,16 +280,15 @@ mod tests {
     }
 
     /// The edit that makes 2 x 2 pixels from `(x, 1)` on the contact.
-    fn edit(doc: &mut Document, pair: &str, finger: PadId, x: usize) -> Edit {
+    fn edit(doc: &mut Document, finger: PadId, x: usize) -> Edit {
         let full = Mask::from_fn(8, 4, |px, py| (x..x + 2).contains(&px) && (1..3).contains(&py));
         let hand = DrawnMask { revision: doc.next_revision(), ..DrawnMask::new(full, Provenance::Nothing) };
-        Edit::Mask { pair: pair.into(), place: MaskPlace::measured(finger), mask: Some(KeptMask::of(&hand)) }
+        Edit::Mask { place: MaskPlace::measured(finger), mask: Some(KeptMask::of(&hand)) }
     }
 
     fn paint(doc: &mut Document, history: &mut History, pair: &str, finger: PadId, x: usize) {
-        let mut edit = edit(doc, pair, finger, x);
-        edit.swap(doc);
-        history.record(Gesture { name: "stroke".into(), edits: vec![edit] });
+        let edits = vec![edit(doc, finger, x)];
+        history.make(doc, Gesture { pair: pair.into(), name: "stroke".into(), edits });
     }
 
     #[test]
@@ -315,21 +296,18 @@ mod tests {
         let mut doc = Document::default();
         let place = MaskPlace::measured(lab::RIGHT);
         let before = hand(&mut doc, "a", lab::RIGHT);
-        let mut edit = edit(&mut doc, "a", lab::RIGHT, 6);
+        let mut edit = edit(&mut doc, lab::RIGHT, 6);
         let copy = edit.clone();
-        edit.swap(&mut doc);
+        edit.swap(&mut doc, "a");
         let there = doc.drawn_mask("a", &place).unwrap();
         assert!(there.mask[(7, 2)] && there.revision > before.revision);
-        edit.swap(&mut doc);
+        edit.swap(&mut doc, "a");
         assert_eq!(doc.drawn_mask("a", &place), Some(&before), "with its revision: results of it are still good");
         assert_eq!(edit, copy);
         // A mask of an earlier run gets a revision that nothing has.
-        let mut edit = Edit::Mask {
-            pair: "a".into(),
-            place: place.clone(),
-            mask: Some(KeptMask { revision: None, ..KeptMask::of(&before) }),
-        };
-        edit.swap(&mut doc);
+        let mut edit =
+            Edit::Mask { place: place.clone(), mask: Some(KeptMask { revision: None, ..KeptMask::of(&before) }) };
+        edit.swap(&mut doc, "a");
         assert_eq!(doc.drawn_mask("a", &place).unwrap().revision.0, doc.last_revision);
     }
 
@@ -350,9 +328,9 @@ mod tests {
         // A prediction that is not on screen is not touched either.
         let predicted =
             MaskPlace { pad: lab::RIGHT, of: ImprintOf::Predicted(PredictedId::from("a prediction".to_owned())) };
-        let mut edit = Edit::Mask { pair: "a".into(), place: predicted.clone(), mask: None };
-        edit.swap(&mut doc);
-        history.record(Gesture { name: "stroke".into(), edits: vec![edit] });
+        let mut edit = Edit::Mask { place: predicted.clone(), mask: None };
+        edit.swap(&mut doc, "a");
+        history.record(Gesture { pair: "a".into(), name: "stroke".into(), edits: vec![edit] });
         assert!(history.next_undo("a", &[MaskPlace::measured(lab::RIGHT)]).is_none());
         assert!(history.undo(&mut doc, "a", &[predicted]).is_some());
         // A new stroke on the other finger does not take the redo of this one away; one on this finger does.
@@ -366,7 +344,7 @@ mod tests {
     fn the_budget_drops_the_oldest() {
         let mut doc = Document::default();
         hand(&mut doc, "a", lab::RIGHT);
-        let one = edit(&mut doc, "a", lab::RIGHT, 2).bytes();
+        let one = edit(&mut doc, lab::RIGHT, 2).bytes();
         let mut history = History::new(3 * one + one / 2);
         for x in 0..6 {
             paint(&mut doc, &mut history, "a", lab::RIGHT, x);

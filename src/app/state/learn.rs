@@ -20,33 +20,19 @@ pub(crate) const STEPS: RangeInclusive<u32> = 1..=100_000;
 /// Most percent of the pairs that can be left out.
 pub(crate) const MOST_HELD_OUT: u8 = 90;
 
-/// Network that learns from the open pairs.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, strum::EnumIter)]
-pub enum Network {
-    /// The generator, fitted to pairs.
-    #[default]
-    Generator,
-    /// The mask model, trained on masks.
-    Masks,
+with_texts! {
+    /// Network that learns from the open pairs.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, strum::EnumIter)]
+    pub enum Network(name, what) {
+        /// The generator, fitted to pairs.
+        #[default]
+        Generator = "Generator", "Fit the model";
+        /// The mask model, trained on masks.
+        Masks = "Mask model", "Train the mask model";
+    }
 }
 
 impl Network {
-    /// The name on its tab.
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Self::Generator => "Generator",
-            Self::Masks => "Mask model",
-        }
-    }
-
-    /// The work, for errors and as a title.
-    pub(crate) fn what(self) -> &'static str {
-        match self {
-            Self::Generator => "Fit the model",
-            Self::Masks => "Train the mask model",
-        }
-    }
-
     /// The kind of its bundles.
     pub(crate) fn kind(self) -> BundleKind {
         match self {
@@ -56,59 +42,38 @@ impl Network {
     }
 }
 
-/// The pairs that a generator is fitted to.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, strum::EnumIter)]
-pub enum AdaptPairs {
-    /// All of the data set.
-    #[default]
-    All,
-    /// The pairs marked done.
-    Done,
-    /// The pairs in the list as it is filtered.
-    Listed,
-}
-
-impl AdaptPairs {
-    /// The name on screen.
-    pub fn label(self) -> &'static str {
-        match self {
-            Self::All => "all pairs",
-            Self::Done => "pairs marked done",
-            Self::Listed => "pairs in the list",
-        }
+with_texts! {
+    /// The pairs that a generator is fitted to.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, strum::EnumIter)]
+    pub enum AdaptPairs(label) {
+        /// All of the data set.
+        #[default]
+        All = "all pairs",
+        /// The pairs marked done.
+        Done = "pairs marked done",
+        /// The pairs in the list as it is filtered.
+        Listed = "pairs in the list",
     }
 }
 
-/// The choices of a person about the next fit and the next training. Not kept between runs of the program.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct LearnForm {
-    /// The pairs that the generator is fitted to.
-    pub pairs: AdaptPairs,
-    /// True where its networks are tuned after the closed form.
-    pub tune: bool,
-    /// With how many steps: 50 take about a minute on two free cores, for each part and for all.
-    pub tuning_steps: u32,
-    /// The division into pairs that the mask model learns from and pairs that are left out.
-    pub choice: TrainChoice,
-    /// True where the number of its steps is given, not the time.
-    pub by_steps: bool,
-    /// For how long it is trained.
-    pub minutes: u32,
-    /// With how many steps.
-    pub steps: u32,
-}
-
-impl Default for LearnForm {
-    fn default() -> Self {
-        Self {
-            pairs: AdaptPairs::default(),
-            tune: false,
-            tuning_steps: 50,
-            choice: TrainChoice::default(),
-            by_steps: false,
-            minutes: 10,
-            steps: 300,
-        }
+with_defaults! {
+    /// The choices of a person about the next fit and the next training. Not kept between runs of the program.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub struct LearnForm {
+        /// The pairs that the generator is fitted to.
+        pub pairs: AdaptPairs = AdaptPairs::default(),
+        /// True where its networks are tuned after the closed form.
+        pub tune: bool = false,
+        /// With how many steps: 50 take about a minute on two free cores, for each part and for all.
+        pub tuning_steps: u32 = 50,
+        /// The division into pairs that the mask model learns from and pairs that are left out.
+        pub choice: TrainChoice = TrainChoice::default(),
+        /// True where the number of its steps is given, not the time.
+        pub by_steps: bool = false,
+        /// For how long it is trained.
+        pub minutes: u32 = 10,
+        /// With how many steps.
+        pub steps: u32 = 300,
     }
 }
 

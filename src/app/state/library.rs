@@ -17,33 +17,22 @@ use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::labels::filter::Filter;
 use touch2touch_pipeline::steps::bundles::{BundleInfo, BundleKind, by_id};
 
-/// The order of the browser's list.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, EnumIter)]
-#[serde(rename_all = "snake_case")]
-pub enum Sort {
-    /// By position in the data set.
-    #[default]
-    Natural,
-    /// By name, as text.
-    Name,
-    /// By tool, then position.
-    Tool,
-    /// Unfinished first, then position.
-    Review,
-    /// By the chosen score, the worst first unless chosen otherwise; what was not scored last.
-    Score,
-}
-
-impl Sort {
-    /// The name on screen.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Natural => "Natural",
-            Self::Name => "Name",
-            Self::Tool => "Tool",
-            Self::Review => "Review state",
-            Self::Score => "Score",
-        }
+with_texts! {
+    /// The order of the browser's list.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, EnumIter)]
+    #[serde(rename_all = "snake_case")]
+    pub enum Sort(name) {
+        /// By position in the data set.
+        #[default]
+        Natural = "Natural",
+        /// By name, as text.
+        Name = "Name",
+        /// By tool, then position.
+        Tool = "Tool",
+        /// Unfinished first, then position.
+        Review = "Review state",
+        /// By the chosen score, the worst first unless chosen otherwise; what was not scored last.
+        Score = "Score",
     }
 }
 

@@ -39,67 +39,69 @@ pub(crate) const STEPS: std::ops::RangeInclusive<u32> = 1..=1000;
 /// Largest budget of kept predictions, MiB: a terabyte.
 pub(crate) const MAX_CACHE_MIB: u32 = 1 << 20;
 
-/// All preferences.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct Settings {
-    /// [`SETTINGS_VERSION`] of the program that wrote it.
-    pub version: u32,
-    /// Colors of the window.
-    pub theme: Theme,
-    /// Scale of the whole window, 1 = the system's.
-    pub ui_zoom: f32,
-    /// The color range of imprints, shared by all panes.
-    pub range: ColorRange,
-    /// The color map of imprints.
-    pub color_map: ColorMap,
-    /// The mapping of predictions to meters.
-    pub shift: ShiftMode,
-    /// The last statistics made for a refit shift, to be chosen again.
-    pub refit: Option<RefitShift>,
-    /// The generator.
-    pub generate: GenerateSettings,
-    /// The mask tools.
-    pub mask: MaskSettings,
-    /// The registration.
-    #[serde(rename = "pose_engine")]
-    pub registration: Registration,
-    /// The runtime that runs models.
-    pub runtime: EngineChoice,
-    /// The budget of the predictions kept on the disk, MiB; 0 keeps none.
-    pub cache_mib: u32,
-    /// Who labels; empty: whom the system says.
-    pub person: String,
-    /// The look of the 3D views.
-    pub scene: SceneLook,
-    /// The sides that have a 3D view, where a person chose them for a workspace.
-    pub sides: std::collections::BTreeMap<Workspace, SpacePane>,
-    /// The GelSlim image that is shown.
-    pub gel: GelView,
-    /// The comparison of each workspace.
-    pub compare: std::collections::BTreeMap<Workspace, CompareChoice>,
-    /// True where the mask is drawn over imprints.
-    pub mask_visible: bool,
-    /// True where only the outline of the mask is drawn.
-    pub mask_outline: bool,
-    /// The opacity of the mask, 0..1.
-    pub mask_opacity: f32,
-    /// True where the GelSlim's window is drawn on bubble images.
-    pub footprint_visible: bool,
-    /// True where the hint of the first start was dismissed.
-    pub hint_dismissed: bool,
-    /// True where the panel about the data set opens with each folder of somebody's own.
-    pub about_own_data: bool,
-    /// The places that were opened before, newest first.
-    pub recent: Vec<Place>,
-    /// The arrangement of the panes per workspace, in the window's own format (validated by it).
-    pub layouts: std::collections::BTreeMap<String, String>,
-    /// The workspace in front.
-    pub workspace: Workspace,
-    /// Folders with further model bundles.
-    pub bundle_folders: Vec<PathBuf>,
-    /// The screen when the window was closed.
-    pub last: Last,
+with_defaults! {
+    /// All preferences.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(default)]
+    pub struct Settings {
+        /// [`SETTINGS_VERSION`] of the program that wrote it.
+        pub version: u32 = SETTINGS_VERSION,
+        /// Colors of the window.
+        pub theme: Theme = Theme::Dark,
+        /// Scale of the whole window, 1 = the system's.
+        pub ui_zoom: f32 = 1.0,
+        /// The color range of imprints, shared by all panes.
+        pub range: ColorRange = ColorRange::default(),
+        /// The color map of imprints.
+        pub color_map: ColorMap = ColorMap::Viridis,
+        /// The mapping of predictions to meters.
+        pub shift: ShiftMode = ShiftMode::default(),
+        /// The last statistics made for a refit shift, to be chosen again.
+        pub refit: Option<RefitShift> = None,
+        /// The generator.
+        pub generate: GenerateSettings = GenerateSettings::default(),
+        /// The mask tools.
+        pub mask: MaskSettings = MaskSettings::default(),
+        /// The registration.
+        #[serde(rename = "pose_engine")]
+        pub registration: Registration = Registration::default(),
+        /// The runtime that runs models.
+        pub runtime: EngineChoice = EngineChoice::default(),
+        /// The budget of the predictions kept on the disk, MiB; 0 keeps none.
+        pub cache_mib: u32 = 512,
+        /// Who labels; empty: whom the system says.
+        pub person: String = String::new(),
+        /// The look of the 3D views.
+        pub scene: SceneLook = SceneLook::default(),
+        /// The sides that have a 3D view, where a person chose them for a workspace.
+        pub sides: std::collections::BTreeMap<Workspace, SpacePane> = std::collections::BTreeMap::new(),
+        /// The GelSlim image that is shown.
+        pub gel: GelView = GelView::default(),
+        /// The comparison of each workspace.
+        pub compare: std::collections::BTreeMap<Workspace, CompareChoice> = std::collections::BTreeMap::new(),
+        /// True where the mask is drawn over imprints.
+        pub mask_visible: bool = true,
+        /// True where only the outline of the mask is drawn.
+        pub mask_outline: bool = false,
+        /// The opacity of the mask, 0..1.
+        pub mask_opacity: f32 = 0.35,
+        /// True where the GelSlim's window is drawn on bubble images.
+        pub footprint_visible: bool = true,
+        /// True where the hint of the first start was dismissed.
+        pub hint_dismissed: bool = false,
+        /// True where the panel about the data set opens with each folder of somebody's own.
+        pub about_own_data: bool = true,
+        /// The places that were opened before, newest first.
+        pub recent: Vec<Place> = Vec::new(),
+        /// The arrangement of the panes per workspace, in the window's own format (validated by it).
+        pub layouts: std::collections::BTreeMap<String, String> = std::collections::BTreeMap::new(),
+        /// The workspace in front.
+        pub workspace: Workspace = Workspace::Inspect,
+        /// Folders with further model bundles.
+        pub bundle_folders: Vec<PathBuf> = Vec::new(),
+        /// The screen when the window was closed.
+        pub last: Last = Last::default(),
+    }
 }
 
 /// The screen when the window was closed: shown again when the same place is opened next.
@@ -118,41 +120,6 @@ pub struct Last {
     pub cameras: [String; 2],
     /// The pane that filled the window, in the window's own format; empty = none.
     pub maximized: String,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self {
-            version: SETTINGS_VERSION,
-            theme: Theme::Dark,
-            ui_zoom: 1.0,
-            range: ColorRange::default(),
-            color_map: ColorMap::Viridis,
-            shift: ShiftMode::default(),
-            refit: None,
-            generate: GenerateSettings::default(),
-            mask: MaskSettings::default(),
-            registration: Registration::default(),
-            runtime: EngineChoice::default(),
-            cache_mib: 512,
-            person: String::new(),
-            scene: SceneLook::default(),
-            sides: std::collections::BTreeMap::new(),
-            gel: GelView::default(),
-            compare: std::collections::BTreeMap::new(),
-            mask_visible: true,
-            mask_outline: false,
-            mask_opacity: 0.35,
-            footprint_visible: true,
-            hint_dismissed: false,
-            about_own_data: true,
-            recent: Vec::new(),
-            layouts: std::collections::BTreeMap::new(),
-            workspace: Workspace::Inspect,
-            bundle_folders: Vec::new(),
-            last: Last::default(),
-        }
-    }
 }
 
 impl Settings {
@@ -217,55 +184,33 @@ pub enum Theme {
     Light,
 }
 
-/// A GelSlim image.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, EnumIter)]
-#[serde(rename_all = "snake_case")]
-pub enum GelView {
-    /// Touched minus untouched, around mid gray.
-    #[default]
-    Difference,
-    /// During the touch.
-    Raw,
-    /// Without contact.
-    Reference,
-}
-
-impl GelView {
-    /// The name on screen.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Difference => "difference",
-            Self::Raw => "raw",
-            Self::Reference => "reference",
-        }
-    }
-
-    /// The tooltip.
-    pub fn tooltip(self) -> &'static str {
-        match self {
-            Self::Difference => "Contact minus no contact, around mid gray: what the generator sees",
-            Self::Raw => "The image in contact, rotated to line up with the bubble",
-            Self::Reference => "The image without contact, rotated to line up with the bubble",
-        }
+with_texts! {
+    /// A GelSlim image.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, EnumIter)]
+    #[serde(rename_all = "snake_case")]
+    pub enum GelView(name, tooltip) {
+        /// Touched minus untouched, around mid gray.
+        #[default]
+        Difference = "difference", "Contact minus no contact, around mid gray: what the generator sees";
+        /// During the touch.
+        Raw = "raw", "The image in contact, rotated to line up with the bubble";
+        /// Without contact.
+        Reference = "reference", "The image without contact, rotated to line up with the bubble";
     }
 }
 
-/// The range of imprint depths that the color map spans, shared by all panes.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct ColorRange {
-    /// Depth of the first color, meters.
-    pub min_m: f32,
-    /// Depth of the last color, meters.
-    pub max_m: f32,
-    /// True where the range stays when another sample is shown. Unlocked, each new selection sets it.
-    pub locked: bool,
-}
-
-impl Default for ColorRange {
-    /// 0..18 mm: a 10 mm press tents up to that depth.
-    fn default() -> Self {
-        Self { min_m: 0.0, max_m: 0.018, locked: true }
+with_defaults! {
+    /// The range of imprint depths that the color map spans, shared by all panes.
+    #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(default)]
+    pub struct ColorRange {
+        /// Depth of the first color, meters.
+        pub min_m: f32 = 0.0,
+        /// Depth of the last color, meters.
+        // A 10 mm press tents up to that depth.
+        pub max_m: f32 = 0.018,
+        /// True where the range stays when another sample is shown. Unlocked, each new selection sets it.
+        pub locked: bool = true,
     }
 }
 
@@ -276,71 +221,47 @@ impl ColorRange {
     }
 }
 
-/// Color maps for depth.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, EnumIter)]
-#[serde(rename_all = "snake_case")]
-pub enum ColorMap {
-    /// Perceptually uniform, dark blue to yellow, readable by color-blind eyes.
-    #[default]
-    Viridis,
-    /// Gray.
-    Gray,
-}
-
-impl ColorMap {
-    /// The name on screen.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Viridis => "Viridis",
-            Self::Gray => "Gray",
-        }
+with_texts! {
+    /// Color maps for depth.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, EnumIter)]
+    #[serde(rename_all = "snake_case")]
+    pub enum ColorMap(name) {
+        /// Perceptually uniform, dark blue to yellow, readable by color-blind eyes.
+        #[default]
+        Viridis = "Viridis",
+        /// Gray.
+        Gray = "Gray",
     }
 }
 
-/// The generator's settings.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct GenerateSettings {
-    /// The bundle's name; `None` takes the first generator found.
-    pub bundle: Option<String>,
-    /// The choice of the steps; `None` takes the numbers below.
-    pub preset: Option<Preset>,
-    /// Denoising steps.
-    pub steps: u32,
-    /// Seed of the noise.
-    pub seed: u64,
-    /// True where generating again keeps the seed.
-    pub seed_locked: bool,
-    /// The sampler.
-    pub sampler: Sampler,
-    /// DDIM's noise share, 0..1.
-    pub eta: f64,
-    /// The training steps visited.
-    pub spacing: Spacing,
-    /// A picture on the way after so many steps, and after the first; 0 = none.
-    pub preview_every: u32,
-    /// True where both fingers are generated (the pose needs both); else only the one selected.
-    pub both_fingers: bool,
-    /// True where the pair on screen is predicted without being asked, where that costs little.
-    pub by_itself: bool,
-}
-
-impl Default for GenerateSettings {
-    fn default() -> Self {
-        Self {
-            bundle: None,
-            // What the bundle recommends; the numbers below are where somebody who chooses himself starts.
-            preset: Some(Preset::Default),
-            steps: 10,
-            seed: 42,
-            seed_locked: true,
-            sampler: Sampler::Ddim,
-            eta: 0.0,
-            spacing: Spacing::Trailing,
-            preview_every: 4,
-            both_fingers: true,
-            by_itself: true,
-        }
+with_defaults! {
+    /// The generator's settings.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(default)]
+    pub struct GenerateSettings {
+        /// The bundle's name; `None` takes the first generator found.
+        pub bundle: Option<String> = None,
+        /// The choice of the steps; `None` takes the numbers below.
+        // What the bundle recommends; the numbers below are where somebody who chooses himself starts.
+        pub preset: Option<Preset> = Some(Preset::Default),
+        /// Denoising steps.
+        pub steps: u32 = 10,
+        /// Seed of the noise.
+        pub seed: u64 = 42,
+        /// True where generating again keeps the seed.
+        pub seed_locked: bool = true,
+        /// The sampler.
+        pub sampler: Sampler = Sampler::Ddim,
+        /// DDIM's noise share, 0..1.
+        pub eta: f64 = 0.0,
+        /// The training steps visited.
+        pub spacing: Spacing = Spacing::Trailing,
+        /// A picture on the way after so many steps, and after the first; 0 = none.
+        pub preview_every: u32 = 4,
+        /// True where both fingers are generated (the pose needs both); else only the one selected.
+        pub both_fingers: bool = true,
+        /// True where the pair on screen is predicted without being asked, where that costs little.
+        pub by_itself: bool = true,
     }
 }
 
@@ -385,50 +306,34 @@ impl GenerateSettings {
     }
 }
 
-/// The mask tools' settings.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct MaskSettings {
-    /// The tool in hand.
-    pub tool: MaskTool,
-    /// The tool before it.
-    pub last_tool: MaskTool,
-    /// The paint of the tools; the eraser frees pixels.
-    pub paint: Paint,
-    /// Radius of brush and eraser, image pixels.
-    pub radius_px: f32,
-    /// By how much the depth may differ that the wand takes, meters.
-    pub wand_m: f32,
-    /// The points that a drawing in 3D reaches.
-    pub layers: Layers,
-    /// Size of the clean-ups that have one, millimeters.
-    pub clean_mm: f32,
-    /// The source of proposals.
-    pub proposal: ProposalSource,
-    /// True where accepting a proposal replaces what was painted by hand as well.
-    pub over_drawn: bool,
-    /// The choice of the masks that nobody drew.
-    #[serde(flatten)]
-    pub choice: MaskChoice,
-    /// The mask bundle's name; `None` takes the first found.
-    pub bundle: Option<String>,
-}
-
-impl Default for MaskSettings {
-    fn default() -> Self {
-        Self {
-            tool: MaskTool::Brush,
-            last_tool: MaskTool::Eraser,
-            paint: Paint::Contact,
-            radius_px: 4.0,
-            wand_m: 0.0005,
-            layers: Layers::default(),
-            clean_mm: 1.0,
-            proposal: ProposalSource::default(),
-            over_drawn: false,
-            choice: MaskChoice::default(),
-            bundle: None,
-        }
+with_defaults! {
+    /// The mask tools' settings.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(default)]
+    pub struct MaskSettings {
+        /// The tool in hand.
+        pub tool: MaskTool = MaskTool::Brush,
+        /// The tool before it.
+        pub last_tool: MaskTool = MaskTool::Eraser,
+        /// The paint of the tools; the eraser frees pixels.
+        pub paint: Paint = Paint::Contact,
+        /// Radius of brush and eraser, image pixels.
+        pub radius_px: f32 = 4.0,
+        /// By how much the depth may differ that the wand takes, meters.
+        pub wand_m: f32 = 0.0005,
+        /// The points that a drawing in 3D reaches.
+        pub layers: Layers = Layers::default(),
+        /// Size of the clean-ups that have one, millimeters.
+        pub clean_mm: f32 = 1.0,
+        /// The source of proposals.
+        pub proposal: ProposalSource = ProposalSource::default(),
+        /// True where accepting a proposal replaces what was painted by hand as well.
+        pub over_drawn: bool = false,
+        /// The choice of the masks that nobody drew.
+        #[serde(flatten)]
+        pub choice: MaskChoice = MaskChoice::default(),
+        /// The mask bundle's name; `None` takes the first found.
+        pub bundle: Option<String> = None,
     }
 }
 

@@ -8,6 +8,7 @@ use super::super::keys::ImprintSource;
 use super::super::pane::Pane;
 use super::export::Output;
 use touch2touch_core::dataset::PairId;
+pub use touch2touch_core::frames::CameraPreset;
 use touch2touch_core::rig::PadId;
 
 /// The selection: everything that is looked at.
@@ -44,38 +45,26 @@ pub struct Hover {
     pub at_px: [f32; 2],
 }
 
-/// A view direction of the 3D panes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum CameraPreset {
-    /// From the left finger.
-    Left,
-    /// From the right finger.
-    Right,
-    /// Along y.
-    Front,
-    /// Against y.
-    Back,
-    /// Along z, from the wrist.
-    Top,
-    /// Against z, from below.
-    Bottom,
-    /// From above a corner, as a view begins.
-    Oblique,
+/// Purpose of a dialog.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Purpose {
+    /// A folder with pairs, to open.
+    Folder,
+    /// The folder that the results table is written to.
+    Table,
+    /// The folder of masks that are imported.
+    Masks,
+    /// The folder that labels are written to which could not be saved.
+    Labels,
+    /// A place that something is written to.
+    Output(Output),
 }
 
 /// A request that only the window can fulfil, once. Handed out by the runtime's `tick`.
 #[derive(Clone, Debug, PartialEq)]
 pub enum UiRequest {
-    /// Show the native dialog for a folder, or a path box; answer with `LibraryCommand::Open`.
-    PickFolder,
-    /// Ask for the folder to write the results table to; answer with `EvaluateCommand::Export`.
-    PickTableFolder,
-    /// Ask where something is to be written; answer with `ExportCommand::Write`.
-    PickOutput(Output),
-    /// Ask for the folder of masks that are imported; answer with `ExportCommand::AskImport`.
-    PickMasks,
-    /// Ask for the folder to write labels to that could not be saved; answer with `UnsavedCommand::Elsewhere`.
-    PickLabelsFolder,
+    /// Show the native dialog for a place, or a path box; the answer is the command of its purpose.
+    Pick(Purpose),
     /// Close the window.
     Close,
     /// Turn the 3D cameras.

@@ -9,45 +9,21 @@ use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::manual::ManualCost;
 use touch2touch_core::rig::PadId;
 
-/// The coloring of the contact points in 3D.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, EnumIter)]
-pub enum Layer {
-    /// One color.
-    #[default]
-    None,
-    /// The distance of each from the model.
-    Residuals,
-    /// The fate of each in the registration.
-    Reasons,
-    /// The signed distance of each from the model, negative inside, and the same on the model's surface.
-    Distance,
-    /// Lines to the model.
-    Correspondences,
-}
-
-impl Layer {
-    /// The name on screen.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::None => "One color",
-            Self::Residuals => "Residual",
-            Self::Reasons => "Pixels used",
-            Self::Distance => "Distance",
-            Self::Correspondences => "Pull lines",
-        }
-    }
-
-    /// The tooltip.
-    pub fn tooltip(self) -> &'static str {
-        match self {
-            Self::None => "Contact points in one color",
-            Self::Residuals => "Contact points colored by their distance to the model, in millimeters",
-            Self::Reasons => "Contact points colored by whether and why the registration used them",
-            Self::Distance => {
-                "Contact points and CAD surface colored by their distance in mm: blue inside, red outside"
-            }
-            Self::Correspondences => "Lines from contact points to the model",
-        }
+with_texts! {
+    /// The coloring of the contact points in 3D.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, EnumIter)]
+    pub enum Layer(name, tooltip) {
+        /// One color.
+        #[default]
+        None = "One color", "Contact points in one color";
+        /// The distance of each from the model.
+        Residuals = "Residual", "Contact points colored by their distance to the model, in millimeters";
+        /// The fate of each in the registration.
+        Reasons = "Pixels used", "Contact points colored by whether and why the registration used them";
+        /// The signed distance of each from the model, negative inside, and the same on the model's surface.
+        Distance = "Distance", "Contact points and CAD surface colored by their distance in mm: blue inside, red outside";
+        /// Lines to the model.
+        Correspondences = "Pull lines", "Lines from contact points to the model";
     }
 }
 
@@ -96,7 +72,7 @@ pub struct ManualTry {
 }
 
 /// The workbench: what the 3D panes do and show besides.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Workbench {
     /// The coloring of the contact points.
     pub layer: Layer,
@@ -112,20 +88,6 @@ pub struct Workbench {
     pub hand: Option<ManualTry>,
     /// The point clicked last.
     pub picked: Option<Picked>,
-}
-
-impl Default for Workbench {
-    fn default() -> Self {
-        Self {
-            layer: Layer::None,
-            tools_tried: None,
-            both_clouds: false,
-            tool: SceneTool::Look,
-            side: ImprintSource::Measured,
-            hand: None,
-            picked: None,
-        }
-    }
 }
 
 impl Workbench {

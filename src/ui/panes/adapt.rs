@@ -21,39 +21,35 @@ pub(crate) type Memory = ();
 /// The pane.
 pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
     let shown = cx.state.learn.shown;
-    crate::ui::parts::theme::pane_frame(cx.p).show(ui, |ui| {
-        ui.set_min_size(ui.available_size());
-        ui.horizontal_wrapped(|ui| {
-            for network in Network::iter() {
-                if ui.selectable_label(network == shown, network.name()).clicked() {
-                    cx.push(LearnCommand::Show(network));
-                }
+    ui.horizontal_wrapped(|ui| {
+        for network in Network::iter() {
+            if ui.selectable_label(network == shown, network.name()).clicked() {
+                cx.push(LearnCommand::Show(network));
             }
-        });
-        if shown == Network::Generator && cx.state.learn.adapted.is_none() && learn::curves(cx.state, shown).is_empty()
-        {
-            generator::choices(cx, ui);
-            // Before the first fit the invitation has the button.
-            let begun =
-                cx.state.learn.stopped[shown as usize].is_some() || cx.state.tasks.of_kind(TaskKind::Learn).is_some();
-            if begun {
-                start(cx, ui, shown);
-            }
-            return generator::nothing_yet(cx, ui, begun);
         }
-        ScrollArea::vertical().auto_shrink(false).id_salt(("adapt", shown as usize)).show(ui, |ui| {
-            match shown {
-                Network::Generator => generator::choices(cx, ui),
-                Network::Masks => masks::choices(cx, ui),
-            }
+    });
+    if shown == Network::Generator && cx.state.learn.adapted.is_none() && learn::curves(cx.state, shown).is_empty() {
+        generator::choices(cx, ui);
+        // Before the first fit the invitation has the button.
+        let begun =
+            cx.state.learn.stopped[shown as usize].is_some() || cx.state.tasks.of_kind(TaskKind::Learn).is_some();
+        if begun {
             start(cx, ui, shown);
-            how_it_goes(cx, ui, shown);
-            match (shown, cx.state.learn.trained.clone()) {
-                (Network::Generator, _) => generator::worth(cx, ui),
-                (Network::Masks, Some(trained)) => masks::worth(cx, ui, &trained),
-                (Network::Masks, None) => {}
-            }
-        });
+        }
+        return generator::nothing_yet(cx, ui, begun);
+    }
+    ScrollArea::vertical().auto_shrink(false).id_salt(("adapt", shown as usize)).show(ui, |ui| {
+        match shown {
+            Network::Generator => generator::choices(cx, ui),
+            Network::Masks => masks::choices(cx, ui),
+        }
+        start(cx, ui, shown);
+        how_it_goes(cx, ui, shown);
+        match (shown, cx.state.learn.trained.clone()) {
+            (Network::Generator, _) => generator::worth(cx, ui),
+            (Network::Masks, Some(trained)) => masks::worth(cx, ui, &trained),
+            (Network::Masks, None) => {}
+        }
     });
 }
 

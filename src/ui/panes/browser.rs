@@ -16,6 +16,7 @@ use crate::app::results;
 use crate::app::tasks::TaskKind;
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{Palette, SMALL, caption, grade_color};
+use crate::ui::parts::widget::choice::choose;
 use crate::ui::parts::widget::cut::cut_in_the_middle;
 use crate::ui::parts::widget::empty;
 use crate::ui::parts::widget::texture::depth_image;
@@ -53,13 +54,10 @@ pub(crate) struct Memory {
 
 /// The pane.
 pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
-    crate::ui::parts::theme::pane_frame(cx.p).show(ui, |ui| {
-        ui.set_min_size(ui.available_size());
-        title(cx, ui);
-        filter_row(cx, ui, memory);
-        ui.add_space(2.0);
-        list(cx, ui, memory);
-    });
+    title(cx, ui);
+    filter_row(cx, ui, memory);
+    ui.add_space(2.0);
+    list(cx, ui, memory);
 }
 
 /// Title of what is open.
@@ -100,14 +98,10 @@ fn filter_row(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
         response.on_hover_text(Action::FindPair.behind(tip));
         let sort = cx.state.library.sort;
         let combo = egui::ComboBox::from_id_salt("sort").width(sort_width).selected_text(sort.name());
-        let response = combo.show_ui(ui, |ui| {
-            for s in Sort::iter() {
-                if ui.selectable_label(s == sort, s.name()).clicked() {
-                    cx.out.push(Command::Library(LibraryCommand::SetSort(s)));
-                }
-            }
-        });
-        response.response.accessible_name("Sort").on_hover_text("Order of the list");
+        let said = |s: &Sort| (s.name(), "");
+        if let Some(sort) = choose(ui, combo, ("Sort", "Order of the list"), Some(&sort), Sort::iter(), said) {
+            cx.push(LibraryCommand::SetSort(sort));
+        }
     });
     score_row(cx, ui);
     if let Some(open) = &cx.state.library.open
@@ -116,17 +110,12 @@ fn filter_row(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
         let chosen = cx.state.library.tool.clone();
         let text = chosen.clone().unwrap_or_else(|| format!("All {} tools", open.tools.len()));
         let combo = egui::ComboBox::from_id_salt("tool").width(ui.available_width()).selected_text(text).truncate();
-        let response = combo.show_ui(ui, |ui| {
-            if ui.selectable_label(chosen.is_none(), "All tools").clicked() {
-                cx.out.push(Command::Library(LibraryCommand::SetToolFilter(None)));
-            }
-            for tool in &open.tools {
-                if ui.selectable_label(chosen.as_ref() == Some(tool), tool).clicked() {
-                    cx.out.push(Command::Library(LibraryCommand::SetToolFilter(Some(tool.clone()))));
-                }
-            }
-        });
-        response.response.accessible_name("Tool").on_hover_text("Only pairs of one tool");
+        let all = std::iter::once(None).chain(open.tools.iter().map(|tool| Some(tool.as_str())));
+        let name = ("Tool", "Only pairs of one tool");
+        let asked = choose(ui, combo, name, Some(&chosen.as_deref()), all, |tool| (tool.unwrap_or("All tools"), ""));
+        if let Some(tool) = asked {
+            cx.push(LibraryCommand::SetToolFilter(tool.map(str::to_owned)));
+        }
     }
 }
 
@@ -141,15 +130,11 @@ fn score_row(cx: &mut Cx<'_>, ui: &mut Ui) {
         let direction = 80.0;
         let width = ui.available_width() - direction - 8.0;
         let combo = egui::ComboBox::from_id_salt("score").width(width).selected_text(metric.name());
-        let response = combo.show_ui(ui, |ui| {
-            for f in by.metrics() {
-                if ui.selectable_label(f == metric, f.name()).on_hover_text(f.tip()).clicked() {
-                    next = Some(ScoreChoice { metric: Some(f), ..chosen.clone() });
-                }
-            }
-        });
         let tip = format!("Score to show, sort and filter by, of {}; Results chooses another source", by.short());
-        response.response.accessible_name("Score").on_hover_text(tip);
+        let said = |f: &Metric| (f.name(), f.tip());
+        if let Some(f) = choose(ui, combo, ("Score", &tip), Some(&metric), by.metrics(), said) {
+            next = Some(ScoreChoice { metric: Some(f), ..chosen.clone() });
+        }
         let text = if chosen.best_first { "Best first" } else { "Worst first" };
         let button = egui::Button::new(RichText::new(text).size(SMALL)).selected(sorted);
         let tip = "Sorts by the score; click again to reverse. N shows the next worst pair";

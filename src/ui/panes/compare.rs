@@ -1,29 +1,30 @@
 //! The pane that holds any two imprints of a touch against each other.
 
-mod choose;
-mod figures;
-
-use crate::app::results;
-use crate::app::settings::prefer;
-use eframe::egui::{self, Align2, Color32, Rect, Ui, UiBuilder, pos2, vec2};
+use eframe::egui::{self, Align2, Color32, ComboBox, Rect, RichText, Ui, UiBuilder, pos2, vec2};
 use strum::IntoEnumIterator as _;
 
 use super::images::{absent_text, bar, canvas, failed, finger_text, hover, paint_depth, scale_note, window};
 use crate::app::action::{Action, with_keys};
 use crate::app::keys::ComparisonKey;
 use crate::app::pane::Pane;
-use crate::app::settings::{CompareChoice, CompareMode};
+use crate::app::results;
+use crate::app::settings::{CompareChoice, CompareMode, prefer};
 use crate::app::state::Lookup;
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{Palette, SMALL};
+use crate::ui::parts::widget::choice::choose;
 use crate::ui::parts::widget::colorbar;
 use crate::ui::parts::widget::image_canvas::{CanvasOutput, Primary, shows_squares};
+use crate::ui::parts::widget::line::Line;
 use crate::ui::parts::widget::texture::{Histogram, depth_image};
 use touch2touch_core::colormap::{ColorMap, Range};
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::rig::{PadId, SensorKind};
 use touch2touch_core::units;
-use touch2touch_pipeline::compare::subject::Subject;
+use touch2touch_pipeline::compare::Comparison;
+use touch2touch_pipeline::compare::subject::{RecipeChange, Subject};
+use touch2touch_pipeline::steps::bundles::BundleInfo;
+use touch2touch_pipeline::steps::pose::PoseResult;
 
 /// Nothing is kept between frames.
 pub(crate) type Memory = ();
@@ -70,7 +71,7 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
         header(cx, ui, &chosen);
         // The error's figures stand in the metrics, and in its corner.
         if !chosen.is_error() {
-            figures::show(cx, ui, &chosen);
+            figures(cx, ui, &chosen);
         }
     });
     let flipped = flickers(ui);
@@ -121,7 +122,7 @@ fn header(cx: &mut Cx<'_>, ui: &mut Ui, chosen: &CompareChoice) {
     let width = ui.available_width();
     ui.horizontal_wrapped(|ui| {
         for letter in [Letter::A, Letter::B] {
-            if let Some(subject) = choose::list(cx, ui, chosen, letter, (width - MODE - 34.0) / 2.0) {
+            if let Some(subject) = list(cx, ui, chosen, letter, (width - MODE - 34.0) / 2.0) {
                 cx.push(match letter {
                     Letter::A => prefer(move |s| s.compare_mut().a = subject.clone()),
                     Letter::B => prefer(move |s| s.compare_mut().b = subject.clone()),
@@ -206,7 +207,7 @@ fn difference(cx: &mut Cx<'_>, ui: &mut Ui, chosen: &CompareChoice, finger: PadI
     let squares = shows_squares(&output.map, ui.pixels_per_point());
     let keys = [&chosen.a, &chosen.b].map(|subject| results::subject_key(cx.state, subject, finger));
     let [Ok(a), Ok(b)] = keys else { return None };
-    let range = Range::symmetric(cx.shared.views.error_m());
+    let range = Range::symmetric(cx.shared.views.error_mm * 1e-3);
     let key = (ComparisonKey { a, b }, range.hi.to_bits());
     let picture = cx.shared.textures.get(ui.ctx(), ("compared difference", finger), key, squares, || {
         (depth_image(&compared.error, ColorMap::Diverging, range), Histogram::of(compared.error.as_slice()))
@@ -254,4 +255,84 @@ fn readout(cx: &mut Cx<'_>, output: &CanvasOutput, chosen: &CompareChoice, finge
         text(b),
         text(difference)
     ));
+}
+
+/// Seeds of the mean.
+const SEEDS: usize = 8;
+
+/// The list of one of the two, `width` points wide; what was chosen.
+fn list(cx: &Cx<'_>, ui: &mut Ui, compared: &CompareChoice, letter: Letter, width: f32) -> Option<Subject> {
+    let subject = letter.of(compared);
+    let label = subject.label();
+    let text = RichText::new(format!("{letter:?}  {label}")).color(color(cx.p, compared, letter));
+    let combo = ComboBox::from_id_salt(("compared", letter)).width(width.max(48.0)).selected_text(text).truncate();
+    let (rows, tip) = (rows(cx), format!("{label}. Click to choose another; each workspace remembers its own"));
+    let now = rows.iter().find(|(value, ..)| value == subject);
+    let name = format!("{letter:?}: {label}");
+    let chosen = choose(ui, combo, (&name, &tip), now.as_ref(), &rows, |row| (row.1.as_str(), row.2));
+    chosen.map(|(value, ..)| value.clone())
+}
+
+/// What can stand on a side: the measurement, the prediction on screen, that of each other model.
+fn rows(cx: &Cx<'_>) -> Vec<(Subject, String, &'static str)> {
+    let rig = cx.state.rig();
+    let depth = |b: &&BundleInfo| b.generator.as_ref().is_some_and(|g| g.sensors.output.kind == SensorKind::Depth);
+    let bundles = cx.state.library.bundles.iter().filter(|b| b.fits(&rig)).filter(depth);
+    let mut rows = vec![
+        (Subject::Measured, "Measured".to_owned(), "What the Soft Bubble measured"),
+        (Subject::shown(), "Prediction on screen".to_owned(), "The prediction that the other panes show"),
+    ];
+    rows.extend(bundles.map(|bundle| {
+        let change = RecipeChange { bundle: Some(bundle.name.clone()), ..RecipeChange::default() };
+        (Subject::Predicted(change), bundle.name.clone(), "The prediction of this model; all else follows Generate")
+    }));
+    let mean = Subject::Mean(RecipeChange::default(), SEEDS);
+    rows.push((mean, format!("Mean of {SEEDS} seeds"), "Mean of predictions with different seeds"));
+    let tip = "Prediction of another program: NAME_vqvae.png beside the pair";
+    rows.push((Subject::Stored, "Stored picture".to_owned(), tip));
+    rows
+}
+
+/// Four lines of three columns.
+fn figures(cx: &Cx<'_>, ui: &mut Ui, compared: &CompareChoice) {
+    const NUMBER: f32 = 78.0;
+    let (state, finger) = (cx.state, cx.state.selection.finger);
+    let line = Line { height: 14.0, size: SMALL, column: NUMBER, swatch: None };
+    let mut row = |name: &str, color: Color32, texts: [String; 3], text_color: Color32, tip: &str| {
+        line.show(ui, (name, color), &texts.map(|text| (text, text_color))).on_hover_text(tip);
+    };
+    let heads = ["PSNR dB", "SSIM", "angle °"].map(str::to_owned);
+    row("", cx.p.weak, heads, cx.p.weak, "As in the metrics; behind the angle its error, where the truth is known");
+    let poses = [&compared.a, &compared.b].map(|subject| results::subject_pose(state, subject));
+    for (letter, pose) in [Letter::A, Letter::B].into_iter().zip(poses) {
+        let subject = letter.of(compared);
+        let against = (*subject != Subject::Measured)
+            .then(|| results::subjects_compared(state, subject, &Subject::Measured, finger).ready())
+            .flatten();
+        let texts = texts(against, pose.map_or("–".into(), angle));
+        row(&format!("{letter:?}"), color(cx.p, compared, letter), texts, cx.p.text, "Against the measurement");
+    }
+    let between = (compared.a != compared.b)
+        .then(|| results::subjects_compared(state, &compared.a, &compared.b, finger).ready())
+        .flatten();
+    let turned = match poses {
+        [Some(a), Some(b)] => format!("{:+.1}", units::wrap_angle(a.angle_rad - b.angle_rad).to_degrees()),
+        _ => "–".into(),
+    };
+    row("A and B", cx.p.strong, texts(between, turned), cx.p.strong, "A against B, and the difference of the angles");
+}
+
+fn texts(comparison: Option<&Comparison>, angle: String) -> [String; 3] {
+    let number = |v: Option<f64>, digits: usize| {
+        v.filter(|v| v.is_finite()).map_or("–".to_owned(), |v| units::fixed(v, digits))
+    };
+    [number(comparison.and_then(|c| c.psnr_db), 1), number(comparison.and_then(|c| c.ssim), 3), angle]
+}
+
+fn angle(pose: &PoseResult) -> String {
+    let angle = pose.angle_rad.to_degrees();
+    match pose.error_rad {
+        Some(error) => format!("{angle:.1} ({:.1})", error.to_degrees()),
+        None => format!("{angle:.1}"),
+    }
 }

@@ -11,6 +11,7 @@ use crate::app::keys::{ComparisonKey, PredictionKey, Preset, Sampler, ShiftMode,
 use crate::app::settings::{GenerateSettings, STEPS};
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{SMALL, caption, section, value};
+use crate::ui::parts::widget::choice::choose;
 use touch2touch_core::postprocess::{CorrectionPart, CorrectionParts};
 use touch2touch_pipeline::steps::bundles::{BundleInfo, BundleKind};
 
@@ -36,30 +37,27 @@ pub(crate) type Memory = ();
 
 /// The pane.
 pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
-    crate::ui::parts::theme::pane_frame(cx.p).show(ui, |ui| {
-        ui.set_min_size(ui.available_size());
-        // Above what scrolls: it is in sight in the lowest window.
-        run(cx, ui);
-        ScrollArea::vertical().id_salt("generate").show(ui, |ui| {
-            let bundle = recipe::bundle(cx.state, BundleKind::Generator).ok();
-            let spelt_out = cx.state.settings.generate.spelt_out(bundle);
-            let mut new = spelt_out.clone();
-            model(cx, ui, &mut new);
-            presets(cx, ui, &mut new);
-            mapping(cx, ui);
-            fit_parts(cx, ui);
-            let more = egui::CollapsingHeader::new(RichText::new("More").size(SMALL)).id_salt("more of generate");
-            let more = more.show(ui, |ui| numbers(cx, ui, &mut new));
-            more.header_response.on_hover_text("Sampler, steps, seed, previews");
-            if new != spelt_out {
-                // Whoever changes a number has left the preset.
-                if new.preset == spelt_out.preset && !new.same_numbers(&spelt_out) {
-                    new.preset = None;
-                }
-                cx.push(prefer(move |s| s.generate = new.clone()));
+    // Above what scrolls: it is in sight in the lowest window.
+    run(cx, ui);
+    ScrollArea::vertical().id_salt("generate").show(ui, |ui| {
+        let bundle = recipe::bundle(cx.state, BundleKind::Generator).ok();
+        let spelt_out = cx.state.settings.generate.spelt_out(bundle);
+        let mut new = spelt_out.clone();
+        model(cx, ui, &mut new);
+        presets(cx, ui, &mut new);
+        mapping(cx, ui);
+        fit_parts(cx, ui);
+        let more = egui::CollapsingHeader::new(RichText::new("More").size(SMALL)).id_salt("more of generate");
+        let more = more.show(ui, |ui| numbers(cx, ui, &mut new));
+        more.header_response.on_hover_text("Sampler, steps, seed, previews");
+        if new != spelt_out {
+            // Whoever changes a number has left the preset.
+            if new.preset == spelt_out.preset && !new.same_numbers(&spelt_out) {
+                new.preset = None;
             }
-            results(cx, ui);
-        });
+            cx.push(prefer(move |s| s.generate = new.clone()));
+        }
+        results(cx, ui);
     });
 }
 
@@ -114,12 +112,9 @@ fn numbers(cx: &mut Cx<'_>, ui: &mut Ui, new: &mut GenerateSettings) {
     let bundle = recipe::bundle(cx.state, BundleKind::Generator).ok();
     row(ui, cx.p.weak, "Sampler", |ui| {
         let combo = egui::ComboBox::from_id_salt("sampler").width(72.0).selected_text(sampler_name(new.sampler));
-        let response = combo.show_ui(ui, |ui| {
-            for sampler in Sampler::iter() {
-                ui.selectable_value(&mut new.sampler, sampler, sampler_name(sampler));
-            }
-        });
-        response.response.accessible_name("Sampler").on_hover_text("Algorithm that turns noise into an image");
+        let (name, said) =
+            (("Sampler", "Algorithm that turns noise into an image"), |s: &Sampler| (sampler_name(*s), ""));
+        new.sampler = choose(ui, combo, name, Some(&new.sampler), Sampler::iter(), said).unwrap_or(new.sampler);
         ui.label(RichText::new("eta").color(cx.p.weak));
         let drag = egui::DragValue::new(&mut new.eta).speed(0.01).range(0.0..=1.0).fixed_decimals(2);
         reset(
@@ -312,7 +307,7 @@ fn results(cx: &mut Cx<'_>, ui: &mut Ui) {
             let text = format!("seed {}", recipe.config.seed);
             let label = ui.add(egui::Button::selectable(selected, text).min_size(vec2(84.0, 20.0)));
             if label.on_hover_text("Show this prediction").clicked() {
-                choose(cx, recipe);
+                pick(cx, recipe);
             }
             ui.label(caption(format!("{} steps", recipe.config.steps), cx.p));
             ui.label(value(psnr, cx.p).size(SMALL));
@@ -322,7 +317,7 @@ fn results(cx: &mut Cx<'_>, ui: &mut Ui) {
 }
 
 /// Shows a prediction, and that of the other finger made with the same settings, if there is one.
-fn choose(cx: &mut Cx<'_>, recipe: &PredictionKey) {
+fn pick(cx: &mut Cx<'_>, recipe: &PredictionKey) {
     cx.push(PredictCommand::Choose(recipe.clone()));
     for finger in cx.state.rig().pads() {
         let Some(touch) = cx.state.touch_key(finger) else { continue };

@@ -17,6 +17,7 @@ use crate::app::{recipe, results};
 use crate::ui::parts::cx::{Cx, side_color};
 use crate::ui::parts::pen::{self, Easel};
 use crate::ui::parts::theme::{Palette, SMALL};
+use crate::ui::parts::widget::choice::choose;
 use crate::ui::parts::widget::colorbar;
 use crate::ui::parts::widget::empty;
 use crate::ui::parts::widget::image_canvas::{CanvasMap, CanvasOutput, ImageCanvas, Primary, shows_squares};
@@ -182,14 +183,10 @@ fn choose_gel(cx: &mut Cx<'_>, ui: &mut Ui) {
         ui.set_height(24.0);
         ui.add_space(4.0);
         let combo = ComboBox::from_id_salt("gel").width(0.0).selected_text(RichText::new(now.name()).size(SMALL));
-        let response = combo.show_ui(ui, |ui| {
-            for view in GelView::iter() {
-                if ui.selectable_label(view == now, view.name()).on_hover_text(view.tooltip()).clicked() {
-                    cx.push(prefer(move |s| s.gel = view));
-                }
-            }
-        });
-        response.response.accessible_name("GelSlim image").on_hover_text(now.tooltip());
+        let (name, said) = (("GelSlim image", now.tooltip()), |view: &GelView| (view.name(), view.tooltip()));
+        if let Some(view) = choose(ui, combo, name, Some(&now), GelView::iter(), said) {
+            cx.push(prefer(move |s| s.gel = view));
+        }
     });
 }
 

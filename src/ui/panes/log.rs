@@ -58,16 +58,13 @@ pub(crate) type Memory = ();
 
 /// The pane.
 pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
-    crate::ui::parts::theme::pane_frame(cx.p).show(ui, |ui| {
-        ui.set_min_size(ui.available_size());
-        if cx.state.log.entries.is_empty() {
-            ui.label(caption("Nothing happened yet.", cx.p));
+    if cx.state.log.entries.is_empty() {
+        ui.label(caption("Nothing happened yet.", cx.p));
+    }
+    ScrollArea::vertical().stick_to_bottom(true).id_salt("log").show(ui, |ui| {
+        for entry in &cx.state.log.entries {
+            entry_ui(cx, ui, entry);
         }
-        ScrollArea::vertical().stick_to_bottom(true).id_salt("log").show(ui, |ui| {
-            for entry in &cx.state.log.entries {
-                entry_ui(cx, ui, entry);
-            }
-        });
     });
 }
 

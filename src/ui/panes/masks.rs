@@ -17,6 +17,7 @@ use crate::app::settings::{BRUSH_RADIUS_PX, CLEAN_MM, MaskSettings, MaskTool, To
 use crate::app::state::Lookup;
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{CONTACT, IGNORED, PROPOSED, SMALL, caption, section};
+use crate::ui::parts::widget::choice::choose;
 use crate::ui::parts::widget::icon::{self, Icon};
 use touch2touch_core::label::{DrawTool, Paint};
 use touch2touch_core::units;
@@ -35,28 +36,25 @@ pub(crate) struct Memory {
 
 /// The pane.
 pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
-    crate::ui::parts::theme::pane_frame(cx.p).show(ui, |ui| {
-        ui.set_min_size(ui.available_size());
-        if let Some(err) = cx.state.document.blocked(cx.state.pair_name()) {
-            ui.label(RichText::new("The stored labels of this pair cannot be read.").color(cx.p.wrong));
-            ui.label(caption(format!("{err} They are left untouched, and this pair cannot be edited."), cx.p));
-            return;
-        }
-        ScrollArea::vertical().id_salt("masks").show(ui, |ui| {
-            // What every mask takes comes first, each line in a place of its own: nothing moves under the pointer.
-            tools(cx, ui);
-            paints(cx, ui);
-            said(cx, ui);
-            review(cx, ui);
-            source::show(cx, ui);
-            fold(ui, "Clean up", "One-click clean-ups of the mask", |ui| clean_ups(cx, ui));
-            note(cx, ui, memory);
-            fold(ui, "More", "Opacity, which mask is edited", |ui| {
-                opacity(cx, ui);
-                correct(cx, ui);
-            });
-            progress::show(cx, ui);
+    if let Some(err) = cx.state.document.blocked(cx.state.pair_name()) {
+        ui.label(RichText::new("The stored labels of this pair cannot be read.").color(cx.p.wrong));
+        ui.label(caption(format!("{err} They are left untouched, and this pair cannot be edited."), cx.p));
+        return;
+    }
+    ScrollArea::vertical().id_salt("masks").show(ui, |ui| {
+        // What every mask takes comes first, each line in a place of its own: nothing moves under the pointer.
+        tools(cx, ui);
+        paints(cx, ui);
+        said(cx, ui);
+        review(cx, ui);
+        source::show(cx, ui);
+        fold(ui, "Clean up", "One-click clean-ups of the mask", |ui| clean_ups(cx, ui));
+        note(cx, ui, memory);
+        fold(ui, "More", "Opacity, which mask is edited", |ui| {
+            opacity(cx, ui);
+            correct(cx, ui);
         });
+        progress::show(cx, ui);
     });
 }
 
@@ -310,14 +308,10 @@ fn review(cx: &mut Cx<'_>, ui: &mut Ui) {
         let text = RichText::new(current.name()).color(review_color(cx.p, current));
         ui.add_enabled_ui(editable, |ui| {
             let combo = egui::ComboBox::from_id_salt("review").width(100.0).selected_text(text).truncate();
-            let response = combo.show_ui(ui, |ui| {
-                for review in Review::iter() {
-                    if ui.selectable_label(review == current, review.name()).clicked() {
-                        cx.push(LabelsCommand::SetReview(review));
-                    }
-                }
-            });
-            response.response.accessible_name("Review state").on_hover_text("The review state of this pair");
+            let (name, said) = (("Review state", "The review state of this pair"), |r: &Review| (r.name(), ""));
+            if let Some(review) = choose(ui, combo, name, Some(&current), Review::iter(), said) {
+                cx.push(LabelsCommand::SetReview(review));
+            }
         });
         cx.action_button(ui, Action::DoneAndNext, "Done and next");
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| save_state(cx, ui));

@@ -26,14 +26,11 @@ pub(crate) type Memory = ();
 
 /// The pane.
 pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
-    crate::ui::parts::theme::pane_frame(cx.p).show(ui, |ui| {
-        ui.set_min_size(ui.available_size());
-        ScrollArea::vertical().id_salt("metrics").show(ui, |ui| {
-            pair(cx, ui);
-            pose(cx, ui);
-            comparison(cx, ui);
-            flag(cx, ui);
-        });
+    ScrollArea::vertical().id_salt("metrics").show(ui, |ui| {
+        pair(cx, ui);
+        pose(cx, ui);
+        comparison(cx, ui);
+        flag(cx, ui);
     });
 }
 

@@ -43,55 +43,50 @@ enum Line<'a> {
 
 /// The pane.
 pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
-    crate::ui::parts::theme::pane_frame(cx.p).show(ui, |ui| {
-        ui.set_min_size(ui.available_size());
-        choices(cx, ui, memory);
-        let rows = cx.state.table.rows();
-        let Some(result) = cx.state.table.result.clone() else {
-            let (what, why) = match cx.state.tasks.of_kind(TaskKind::Evaluate) {
-                Some(_) => ("The table appears when all pairs are scored", "Cancel keeps the scores so far"),
-                None => {
-                    ("No results yet", "PSNR, SSIM, angle error and verdict of every pair by each chosen generator")
-                }
-            };
-            let action = Action::PredictAll.command(cx.state);
-            let action = action.map(|_| (Action::PredictAll.name(), Action::PredictAll.tooltip()));
-            if empty::show(ui, what, why, action) {
-                cx.act(Action::PredictAll);
-            }
-            return;
+    choices(cx, ui, memory);
+    let rows = cx.state.table.rows();
+    let Some(result) = cx.state.table.result.clone() else {
+        let (what, why) = match cx.state.tasks.of_kind(TaskKind::Evaluate) {
+            Some(_) => ("The table appears when all pairs are scored", "Cancel keeps the scores so far"),
+            None => ("No results yet", "PSNR, SSIM, angle error and verdict of every pair by each chosen generator"),
         };
-        ui.horizontal(|ui| {
-            let about: Vec<&str> =
-                std::iter::once(result.conventions).chain(result.notes.iter().map(String::as_str)).collect();
-            ui.label(RichText::new(result.size()).color(cx.p.strong)).on_hover_text(about.join("\n"));
-            if !result.complete {
-                ui.label(RichText::new("stopped early").size(SMALL).color(cx.p.caution));
-            }
-        });
-        let shown: Vec<&Column> =
-            columns(&rows).into_iter().filter(|column| memory.more || FEW.contains(&column.key)).collect();
-        head(cx, ui, &shown);
-        let mut groups = result.groups.clone();
-        groups.sort_unstable();
-        let mut lines = Vec::new();
-        for group in groups {
-            lines.push(Line::Group(group));
-            lines.extend(
-                rows.iter().filter_map(|row| Some(Line::Method(row, row.groups.iter().find(|f| f.group == group)?))),
-            );
+        let action = Action::PredictAll.command(cx.state);
+        let action = action.map(|_| (Action::PredictAll.name(), Action::PredictAll.tooltip()));
+        if empty::show(ui, what, why, action) {
+            cx.act(Action::PredictAll);
         }
-        lines.extend(cx.state.library.order.iter().copied().map(Line::Pair));
-        ui.spacing_mut().item_spacing.y = 0.0;
-        ScrollArea::vertical().auto_shrink(false).id_salt("results").show_rows(ui, ROW, lines.len(), |ui, range| {
-            for line in &lines[range] {
-                match line {
-                    Line::Group(group) => method_head(cx, ui, *group),
-                    Line::Method(row, figures) => method(cx, ui, row, figures, &shown),
-                    Line::Pair(pair) => pair_row(cx, ui, *pair, &shown),
-                }
+        return;
+    };
+    ui.horizontal(|ui| {
+        let about: Vec<&str> =
+            std::iter::once(result.conventions).chain(result.notes.iter().map(String::as_str)).collect();
+        ui.label(RichText::new(result.size()).color(cx.p.strong)).on_hover_text(about.join("\n"));
+        if !result.complete {
+            ui.label(RichText::new("stopped early").size(SMALL).color(cx.p.caution));
+        }
+    });
+    let shown: Vec<&Column> =
+        columns(&rows).into_iter().filter(|column| memory.more || FEW.contains(&column.key)).collect();
+    head(cx, ui, &shown);
+    let mut groups = result.groups.clone();
+    groups.sort_unstable();
+    let mut lines = Vec::new();
+    for group in groups {
+        lines.push(Line::Group(group));
+        lines.extend(
+            rows.iter().filter_map(|row| Some(Line::Method(row, row.groups.iter().find(|f| f.group == group)?))),
+        );
+    }
+    lines.extend(cx.state.library.order.iter().copied().map(Line::Pair));
+    ui.spacing_mut().item_spacing.y = 0.0;
+    ScrollArea::vertical().auto_shrink(false).id_salt("results").show_rows(ui, ROW, lines.len(), |ui, range| {
+        for line in &lines[range] {
+            match line {
+                Line::Group(group) => method_head(cx, ui, *group),
+                Line::Method(row, figures) => method(cx, ui, row, figures, &shown),
+                Line::Pair(pair) => pair_row(cx, ui, *pair, &shown),
             }
-        });
+        }
     });
 }
 

@@ -11,10 +11,9 @@ mod pick;
 mod steps;
 mod strip;
 mod verdict;
-mod window;
 
 use eframe::egui::{self, Button, Color32, Rect, RichText, Ui, UiBuilder, vec2};
-use glam::{DAffine3, DVec3};
+use glam::DVec3;
 use strum::IntoEnumIterator as _;
 
 use build::{SceneCloud, SceneMesh, SceneSurface};
@@ -31,7 +30,7 @@ use crate::app::state::{Lookup, State};
 use crate::app::workbench::WorkbenchCommand;
 use crate::gpu::pick::nearest_point;
 use crate::gpu::scene::SceneData;
-use crate::gpu::view::{Camera, Preset};
+use crate::gpu::view::Camera;
 use crate::spatial;
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::made_with;
@@ -82,15 +81,7 @@ impl Memory {
     /// Turns the cameras of both sides.
     pub(crate) fn look_from(&mut self, preset: CameraPreset) {
         for view in &mut self.views {
-            view.camera.look_from(match preset {
-                CameraPreset::Left => Preset::Left,
-                CameraPreset::Right => Preset::Right,
-                CameraPreset::Front => Preset::Front,
-                CameraPreset::Back => Preset::Back,
-                CameraPreset::Top => Preset::Top,
-                CameraPreset::Bottom => Preset::Bottom,
-                CameraPreset::Oblique => Preset::Oblique,
-            });
+            view.camera.look_from(preset);
         }
     }
 
@@ -152,13 +143,6 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
     ui.scope_builder(UiBuilder::new().max_rect(head.shrink2(vec2(4.0, 2.0))), |ui| {
         ui.horizontal_centered(|ui| choose_sides(cx, ui));
     });
-    // The window has a row of its own: in a narrow pane there is none to share.
-    let row = if cx.state.settings.scene.only_window { HEAD } else { 0.0 };
-    let (bar, area) = area.split_top_bottom_at_y((area.top() + row).min(area.bottom()));
-    if row > 0.0 {
-        let mut ui = ui.new_child(UiBuilder::new().max_rect(bar.shrink2(vec2(4.0, 2.0))).id_salt("window"));
-        window::bar(cx, &mut ui);
-    }
     let sides = sides_shown(cx.state);
     // The pose in hand stands below the pictures, not on them, and has the width of all.
     let in_hand = sides.iter().copied().find(|side| hands::strip_height(cx.state, *side) > 0.0);
@@ -308,14 +292,9 @@ fn place_camera(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource, output:
 /// Brings what the view draws up to date.
 fn update(cx: &mut Cx<'_>, memory: &mut Memory, source: ImprintSource) {
     let state = cx.state;
-    if let (Lookup::Ready(clouds), Ok(Some(key))) = (results::cloud(state, source), results::cloud_key(state, source)) {
-        build::update_cloud(cx, memory, source, key, clouds);
-    }
-    if state.workbench.both_clouds {
-        let other = source.other();
-        if let (Lookup::Ready(clouds), Ok(Some(key))) = (results::cloud(state, other), results::cloud_key(state, other))
-        {
-            build::update_cloud(cx, memory, other, key, clouds);
+    for side in std::iter::once(source).chain(state.workbench.both_clouds.then(|| source.other())) {
+        if let (Lookup::Ready(clouds), Ok(Some(key))) = (results::cloud(state, side), results::cloud_key(state, side)) {
+            build::update_cloud(cx, memory, side, key, clouds);
         }
     }
     build::update_mesh(cx, &mut memory.mesh, &mut memory.revision);
@@ -342,7 +321,7 @@ fn aim(
 fn nearest(clouds: &Clouds, camera: &Camera, size: [u32; 2], pointer: glam::DVec2) -> Option<(PadId, usize)> {
     let mut best: Option<(PadId, usize, f64, f64)> = None;
     for (finger, cloud) in clouds.fingers.entries() {
-        let hit = nearest_point(&cloud.points, &DAffine3::IDENTITY, camera, size, pointer, PICK_PX);
+        let hit = nearest_point(&cloud.points, camera, size, pointer, PICK_PX);
         if let Some(hit) = hit {
             let better = best.is_none_or(|(_, _, px, depth)| {
                 hit.distance_px < px - 1.0 || (hit.distance_px < px + 1.0 && hit.depth_m < depth)

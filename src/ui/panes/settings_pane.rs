@@ -9,6 +9,7 @@ use crate::app::command::Pane;
 use crate::app::settings::{ColorMap, MAX_CACHE_MIB};
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{caption, section};
+use crate::ui::parts::widget::choice::choose;
 use touch2touch_pipeline::infer::engine::EngineChoice;
 use touch2touch_pipeline::labels::system_person;
 
@@ -17,10 +18,7 @@ pub(crate) type Memory = ();
 
 /// The pane.
 pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
-    crate::ui::parts::theme::pane_frame(cx.p).show(ui, |ui| {
-        ui.set_min_size(ui.available_size());
-        ScrollArea::vertical().id_salt("settings").show(ui, |ui| body(cx, ui));
-    });
+    ScrollArea::vertical().id_salt("settings").show(ui, |ui| body(cx, ui));
 }
 
 /// Who labels.
@@ -63,14 +61,10 @@ fn body(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.horizontal(|ui| {
         ui.label(RichText::new("Engine").color(cx.p.weak));
         let combo = egui::ComboBox::from_id_salt("runtime").selected_text(settings.runtime.name());
-        let response = combo.show_ui(ui, |ui| {
-            for runtime in EngineChoice::possible() {
-                if ui.selectable_label(runtime == settings.runtime, runtime.name()).clicked() {
-                    cx.out.push(prefer(move |s| s.runtime = runtime).into());
-                }
-            }
-        });
-        response.response.accessible_name("Engine").on_hover_text("What runs the models: processor or GPU");
+        let (name, said) = (("Engine", "What runs the models: processor or GPU"), |e: &EngineChoice| (e.name(), ""));
+        if let Some(runtime) = choose(ui, combo, name, Some(&settings.runtime), EngineChoice::possible(), said) {
+            cx.push(prefer(move |s| s.runtime = runtime));
+        }
     });
     ui.horizontal(|ui| {
         ui.label(RichText::new("Keep predictions").color(cx.p.weak));

@@ -99,20 +99,15 @@ impl Cx<'_> {
     }
 }
 
-/// Part of the pictures that is seen, and the colors of errors: one for all panes.
-pub(crate) struct Views {
-    /// Of GelSlim images.
-    pub gel: ViewTransform,
-    /// Of bubble images.
-    pub bubble: ViewTransform,
-    /// Half the range of the error's colors, millimeters.
-    pub error_mm: f32,
-}
-
-impl Default for Views {
-    fn default() -> Self {
-        let view = ViewTransform::default();
-        Self { gel: view, bubble: view, error_mm: 4.0 }
+with_defaults! {
+    /// Part of the pictures that is seen, and the colors of errors: one for all panes.
+    pub(crate) struct Views {
+        /// Of GelSlim images.
+        pub gel: ViewTransform = ViewTransform::default(),
+        /// Of bubble images.
+        pub bubble: ViewTransform = ViewTransform::default(),
+        /// Half the range of the error's colors, millimeters.
+        pub error_mm: f32 = 4.0,
     }
 }
 
@@ -125,11 +120,6 @@ impl Views {
         if only != Some(SensorKind::Color) {
             self.bubble = ViewTransform::default();
         }
-    }
-
-    /// Half the range of the error's colors, meters.
-    pub(crate) fn error_m(&self) -> f32 {
-        self.error_mm * 1e-3
     }
 }
 

@@ -6,27 +6,12 @@ use std::time::{Duration, Instant};
 
 use eframe::egui::{self, Key, RichText};
 
-use crate::app::export::Output;
+use crate::app::view::Purpose;
 use crate::ui::parts::theme::{Palette, caption};
 use touch2touch_pipeline::io::dataset::BuiltIn;
 
 /// A dialog that ends empty sooner than a person could have closed it was never shown.
 const NEVER_SHOWN: Duration = Duration::from_millis(700);
-
-/// Purpose of a dialog.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Purpose {
-    /// A folder with pairs, to open.
-    Folder,
-    /// The folder that the results table is written to.
-    Table,
-    /// The folder of masks that are imported.
-    Masks,
-    /// The folder that labels are written to which could not be saved.
-    Labels,
-    /// A place that something is written to.
-    Output(Output),
-}
 
 impl Purpose {
     /// Objection to a path, in words.
@@ -242,7 +227,7 @@ mod system {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::app::export::StillAsked;
+    use crate::app::export::{Output, StillAsked};
     use touch2touch_pipeline::still::space::{Ground, SpacePane, ViewAngles};
 
     #[test]

@@ -10,8 +10,7 @@ use super::widget::cut::cut_in_the_middle;
 use crate::app::action::Action;
 use crate::app::keys::{ImprintSource, ShiftMode, shift_name};
 use crate::app::pane::{Kind, Pane};
-use crate::app::results;
-use crate::app::results::Why;
+use crate::app::results::{self, Why};
 
 use touch2touch_core::rig::PadId;
 
@@ -54,7 +53,7 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, title: &str, place: Rect, line:
     };
     let shift = cx.state.settings.shift;
     let model = cx.state.library.model_name(&recipe.bundle);
-    let why = results::outdated(cx.state, finger).map(|outdated| outdated.why);
+    let why = results::outdated(cx.state, finger);
     // What is meant needs no more than its seed; what is not says all that may differ.
     let settings = match why {
         None => format!(", seed {}", recipe.config.seed),
@@ -69,7 +68,7 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, title: &str, place: Rect, line:
         Some(Why::NotMade) => ("Old settings: ", "The current settings would give another prediction"),
     };
     let text = format!("{lead}{model}{settings}");
-    if why.is_some_and(|why| !why.is_meant()) {
+    if why.is_some_and(|why| why != Why::Picked) {
         ui.painter().rect_filled(place, 0.0, cx.p.canvas.gamma_multiply(0.45));
     }
     ui.painter().rect_filled(line, 0.0, cx.p.frame);

@@ -1,20 +1,18 @@
 //! The pen: what the pointer draws on masks, on an image or on the points of a 3D view, and what shows of it on the way.
 
-use crate::app::settings::prefer;
 use eframe::egui::{
     Align2, Color32, CursorIcon, Event, FontId, Key, Modifiers, Painter, PointerButton, Pos2, Response, Stroke, Ui,
     Vec2, vec2,
 };
+use glam::DVec2;
 
 use super::cx::Cx;
 use super::theme::{IGNORED, PROPOSED};
-use super::widget::brush_cursor;
 use super::widget::image_canvas::CanvasMap;
 use crate::app::command::{LabelsCommand, ViewCommand};
 use crate::app::keys::ImprintSource;
 use crate::app::labels::Stroke as Drawn;
-use crate::app::settings::MaskTool;
-use glam::DVec2;
+use crate::app::settings::{MaskTool, prefer};
 use touch2touch_core::label::{DrawTool, Paint};
 use touch2touch_core::rig::PadId;
 
@@ -123,7 +121,7 @@ pub(crate) fn follow<K: Copy + PartialEq>(
         let ctrl = ui.input(|i| i.modifiers.ctrl || i.pointer.secondary_down());
         let erase = (tool == MaskTool::Eraser) != ctrl;
         if matches!(tool, MaskTool::Brush | MaskTool::Eraser) {
-            brush_cursor::paint(easel.painter, pos, easel.radius_px * easel.map.scale, erase, Color32::WHITE);
+            brush_cursor(easel.painter, pos, easel.radius_px * easel.map.scale, erase, Color32::WHITE);
             ui.ctx().set_cursor_icon(CursorIcon::None);
         } else {
             ui.ctx().set_cursor_icon(CursorIcon::Crosshair);
@@ -171,4 +169,16 @@ fn way(cx: &Cx<'_>, easel: &Easel<'_>) {
     line.push(first);
     easel.painter.line(line.clone(), Stroke::new(2.5, Color32::from_black_alpha(120)));
     easel.painter.line(line, Stroke::new(1.25, color));
+}
+
+/// Paints the circle that a stroke at `center` would cover, of a radius in points.
+fn brush_cursor(painter: &Painter, center: Pos2, radius: f32, erase: bool, color: Color32) {
+    // A brush smaller than a point would vanish: never draw it smaller than its own stroke.
+    let radius = radius.max(2.0);
+    painter.circle_stroke(center, radius, Stroke::new(3.0, Color32::from_black_alpha(140)));
+    painter.circle_stroke(center, radius, Stroke::new(1.25, color));
+    if erase {
+        let arm = radius.clamp(3.0, 6.0) * 0.7;
+        painter.hline(center.x - arm..=center.x + arm, center.y, Stroke::new(1.5, color));
+    }
 }

@@ -12,7 +12,7 @@ use super::frame_cache::FrameCache;
 use crate::gpu::pipelines::Pipelines;
 use crate::gpu::scene::{SceneData, SceneRenderer};
 use crate::gpu::target::Target;
-use crate::gpu::view::Camera;
+use crate::gpu::view::{Camera, Part};
 use crate::gpu::{Gpu, GpuError, wgpu};
 
 /// The graphics device as all 3D panes share it.
@@ -213,7 +213,8 @@ impl SceneView {
                 drawn.texture,
             );
         }
-        let changed = drawn.renderer.render(gpu, scene, &self.camera, &drawn.target)?;
+        let part = Part::whole(drawn.target.size());
+        let changed = drawn.renderer.render(gpu, scene, (&self.camera, part), &drawn.target)?;
         Ok((drawn.texture, changed))
     }
 }

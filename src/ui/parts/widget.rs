@@ -1,6 +1,6 @@
 //! Widgets that know nothing of the application's state.
 
-pub mod brush_cursor;
+pub mod choice;
 pub mod colorbar;
 pub mod curves;
 pub mod cut;

@@ -1,7 +1,5 @@
 //! The window: one frame from input to commands.
 
-use crate::app::results;
-use crate::app::settings::prefer;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -24,21 +22,19 @@ use crate::app::evaluate::EvaluateCommand;
 use crate::app::keys::ImprintSource;
 use crate::app::library::Place;
 use crate::app::pane::{Kind, Workspace};
+use crate::app::results;
 use crate::app::runtime::Runtime;
 use crate::app::services::Services;
-use crate::app::settings::Last;
-use crate::app::settings::MaskTool;
-use crate::app::settings::Theme;
+use crate::app::settings::{Last, MaskTool, Theme, prefer};
 use crate::app::state::State;
+use crate::app::view::Purpose;
 use crate::app::workbench::WorkbenchCommand;
 use crate::ui::panes::log as log_pane;
 use crate::ui::parts::cx::{Cx, Shared};
-use crate::ui::parts::dialogs::Purpose;
 use crate::ui::parts::frame_cache::FrameCache;
 use crate::ui::parts::letters;
 use crate::ui::parts::scene_view::Device;
-use crate::ui::parts::theme;
-use crate::ui::parts::theme::{DARK, LIGHT};
+use crate::ui::parts::theme::{self, DARK, LIGHT};
 use touch2touch_core::rig::SensorKind;
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::io::catch_panic::catch_panic;
@@ -222,73 +218,6 @@ impl StudioApp {
         self.trees.iter().all(|(workspace, tree)| layout::is_valid(tree, *workspace))
     }
 
-    /// One round of the runtime.
-    fn tick(&mut self, ctx: &egui::Context) {
-        let mut commands = std::mem::take(&mut self.inbox);
-        // A text for the clipboard and the like is the window's business, all else the model's.
-        let mut requests = Vec::new();
-        commands.retain(|c| match c {
-            Command::View(ViewCommand::Ui(request)) => {
-                requests.push(request.clone());
-                false
-            }
-            _ => true,
-        });
-        let travels = |c: &Command| matches!(c, Command::Labels(LabelsCommand::Undo | LabelsCommand::Redo));
-        let travels = commands.iter().any(travels);
-        if commands.iter().any(|c| matches!(c, Command::Settings(SettingsCommand::ResetSettings))) {
-            self.trees.clear();
-        }
-        let before = self.state.settings.workspace;
-        requests.extend(self.runtime.tick(&mut self.state, commands));
-        if travels && !self.state.document.has_open_polygon() {
-            // The pen is not to be followed into another state.
-            self.lift_pen();
-        }
-        if self.state.settings.workspace != before {
-            // The pen is not to be followed into another workspace.
-            self.lift_pen();
-            self.panes.memories.browser.scrolled_to = None;
-        }
-        if self.inline {
-            let more = crate::app::jobs::Worker::iter().any(|worker| self.runtime.run_one(worker));
-            if more {
-                ctx.request_repaint();
-            }
-        }
-        for request in requests {
-            self.perform(ctx, request);
-        }
-        if let Some(wait) = self.runtime.next_tick() {
-            ctx.request_repaint_after(wait);
-        }
-        self.shared.saved.observe(&self.state.document.unsaved);
-        self.first_prediction();
-        self.resume();
-        let settings = &self.state.settings;
-        if self.applied_theme != Some(settings.theme) {
-            self.applied_theme = Some(settings.theme);
-            ctx.set_theme(match settings.theme {
-                Theme::Dark => ThemePreference::Dark,
-                Theme::Light => ThemePreference::Light,
-            });
-        }
-        // Ctrl + and Ctrl - change the toolkit's zoom: keep it; a zoom from the settings is applied once.
-        if (self.applied_zoom - settings.ui_zoom).abs() > 1e-4 {
-            self.applied_zoom = settings.ui_zoom;
-            ctx.set_zoom_factor(settings.ui_zoom);
-        } else if (ctx.zoom_factor() - self.applied_zoom).abs() > 1e-4 {
-            self.applied_zoom = ctx.zoom_factor();
-            self.inbox.push(
-                prefer({
-                    let zoom = self.applied_zoom;
-                    move |s| s.ui_zoom = zoom
-                })
-                .into(),
-            );
-        }
-    }
-
     /// On the first start a prediction is made unasked, so that there is something to see.
     fn first_prediction(&mut self) {
         if self.first_prediction || self.state.library.open.is_none() || self.state.settings.hint_dismissed {
@@ -335,11 +264,7 @@ impl StudioApp {
     /// Does what only the window can do.
     fn perform(&mut self, ctx: &egui::Context, request: UiRequest) {
         match request {
-            UiRequest::PickFolder => self.shared.dialogs.open(Purpose::Folder, ctx),
-            UiRequest::PickTableFolder => self.shared.dialogs.open(Purpose::Table, ctx),
-            UiRequest::PickOutput(output) => self.shared.dialogs.open(Purpose::Output(output), ctx),
-            UiRequest::PickMasks => self.shared.dialogs.open(Purpose::Masks, ctx),
-            UiRequest::PickLabelsFolder => self.shared.dialogs.open(Purpose::Labels, ctx),
+            UiRequest::Pick(purpose) => self.shared.dialogs.open(purpose, ctx),
             UiRequest::Close => {
                 self.leaving = true;
                 ctx.send_viewport_cmd(ViewportCommand::Close);
@@ -445,16 +370,51 @@ impl StudioApp {
             }
         });
     }
-}
 
-/// The factor that held keys put on a step of the tool in hand.
-fn step_scale(held: egui::Modifiers) -> f64 {
-    if held.command || held.ctrl {
-        0.1
-    } else if held.shift {
-        10.0
-    } else {
-        1.0
+    /// Saves what can be saved; what cannot waits for the next start.
+    fn end(&mut self) {
+        if std::mem::replace(&mut self.ended, true) {
+            return;
+        }
+        let ended = catch_panic(|| {
+            self.remember();
+            let commands = std::mem::take(&mut self.inbox);
+            self.runtime.tick(&mut self.state, commands);
+            let last = vec![Command::Labels(LabelsCommand::EndStroke), Command::Labels(LabelsCommand::Save)];
+            self.runtime.tick(&mut self.state, last);
+            self.runtime.finish(&mut self.state);
+        });
+        if let Err(message) = ended {
+            log::error!("at the end: {message}");
+        }
+    }
+
+    /// Follows the pen no further; whether it was drawing.
+    fn lift_pen(&mut self) -> bool {
+        let memories = &mut self.panes.memories;
+        memories.images.lift_pen() | memories.scene.lift_pen()
+    }
+
+    /// Tells the model what is on screen now, and drops a cross-hair that no pane holds any more. `readout` is what the
+    /// status bar shows.
+    fn after_panes(&mut self, ctx: &egui::Context, readout: Option<&String>, out: &mut Vec<Command>) {
+        if self.panes.drawn != self.state.selection.panes {
+            out.push(Command::View(ViewCommand::ShowPanes(self.panes.drawn.clone())));
+        }
+        if self.state.selection.hover.is_some() && !self.shared.hover_claimed {
+            out.push(Command::View(ViewCommand::HoverPixel(None)));
+        }
+        if self.shared.readout.as_ref() != readout {
+            // The status bar was drawn before the pane under the pointer: once more, with the number in it.
+            ctx.request_repaint();
+        }
+        // What is made of clicks goes on while no button is down. A whole click may lie between two frames: then the state
+        // does not know yet of the drawing that it began.
+        let by_tool = self.state.settings.mask.tool == MaskTool::Polygon;
+        let by_clicks = self.state.document.stroke.as_ref().map_or(by_tool, |stroke| stroke.drawing.is_by_clicks());
+        if !by_clicks && !ctx.input(|i| i.pointer.any_down()) && self.lift_pen() {
+            out.push(Command::Labels(LabelsCommand::EndStroke));
+        }
     }
 }
 
@@ -473,7 +433,55 @@ impl eframe::App for StudioApp {
             ctx.send_viewport_cmd(ViewportCommand::CancelClose);
             self.inbox.push(LabelsCommand::Unsaved(UnsavedCommand::Close).into());
         }
-        self.tick(ctx);
+        let commands = std::mem::take(&mut self.inbox);
+        let travels = |c: &Command| matches!(c, Command::Labels(LabelsCommand::Undo | LabelsCommand::Redo));
+        let travels = commands.iter().any(travels);
+        if commands.iter().any(|c| matches!(c, Command::Settings(SettingsCommand::ResetSettings))) {
+            self.trees.clear();
+        }
+        let before = self.state.settings.workspace;
+        let requests = self.runtime.tick(&mut self.state, commands);
+        if travels && !self.state.document.has_open_polygon() {
+            // The pen is not to be followed into another state.
+            self.lift_pen();
+        }
+        if self.state.settings.workspace != before {
+            // The pen is not to be followed into another workspace.
+            self.lift_pen();
+            self.panes.memories.browser.scrolled_to = None;
+        }
+        if self.inline {
+            let more = crate::app::jobs::Worker::iter().any(|worker| self.runtime.run_one(worker));
+            if more {
+                ctx.request_repaint();
+            }
+        }
+        for request in requests {
+            self.perform(ctx, request);
+        }
+        if let Some(wait) = self.runtime.next_tick() {
+            ctx.request_repaint_after(wait);
+        }
+        self.shared.saved.observe(&self.state.document.unsaved);
+        self.first_prediction();
+        self.resume();
+        let settings = &self.state.settings;
+        if self.applied_theme != Some(settings.theme) {
+            self.applied_theme = Some(settings.theme);
+            ctx.set_theme(match settings.theme {
+                Theme::Dark => ThemePreference::Dark,
+                Theme::Light => ThemePreference::Light,
+            });
+        }
+        // Ctrl + and Ctrl - change the toolkit's zoom: keep it; a zoom from the settings is applied once.
+        if (self.applied_zoom - settings.ui_zoom).abs() > 1e-4 {
+            self.applied_zoom = settings.ui_zoom;
+            ctx.set_zoom_factor(settings.ui_zoom);
+        } else if (ctx.zoom_factor() - self.applied_zoom).abs() > 1e-4 {
+            self.applied_zoom = ctx.zoom_factor();
+            let zoom = self.applied_zoom;
+            self.inbox.push(prefer(move |s| s.ui_zoom = zoom).into());
+        }
     }
 
     fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
@@ -518,7 +526,11 @@ impl eframe::App for StudioApp {
                 }
                 match action.command(state) {
                     Some(Command::Workbench(WorkbenchCommand::Nudge(axis, by))) if action.is_nudge() => {
-                        let scale = step_scale(ctx.input(|i| i.modifiers));
+                        let scale = match ctx.input(|i| i.modifiers) {
+                            held if held.command || held.ctrl => 0.1,
+                            held if held.shift => 10.0,
+                            _ => 1.0,
+                        };
                         cx.push(Command::Workbench(WorkbenchCommand::Nudge(axis, by * scale)));
                     }
                     _ => cx.act(action),
@@ -542,8 +554,8 @@ impl eframe::App for StudioApp {
             log_pane::notices(&mut cx, &ctx);
             bars::hint(&mut cx, &ctx);
             doctor::panel(&mut cx, &ctx);
-            export::masks::form(&mut cx, &ctx);
-            export::import::form(&mut cx, &ctx);
+            export::masks_form(&mut cx, &ctx);
+            export::import_form(&mut cx, &ctx);
             palette::show(&mut cx, &ctx, &mut self.palette);
             shortcuts::list(&mut cx, &ctx, &mut self.shortcuts);
             unsaved::question(&mut cx, &ctx);
@@ -579,55 +591,5 @@ impl Drop for StudioApp {
     /// which is as a kill.)
     fn drop(&mut self) {
         self.end();
-    }
-}
-
-impl StudioApp {
-    /// Saves what can be saved; what cannot waits for the next start.
-    fn end(&mut self) {
-        if std::mem::replace(&mut self.ended, true) {
-            return;
-        }
-        let ended = catch_panic(|| {
-            self.remember();
-            let commands = std::mem::take(&mut self.inbox);
-            self.runtime.tick(&mut self.state, commands);
-            let last = vec![Command::Labels(LabelsCommand::EndStroke), Command::Labels(LabelsCommand::Save)];
-            self.runtime.tick(&mut self.state, last);
-            self.runtime.finish(&mut self.state);
-        });
-        if let Err(message) = ended {
-            log::error!("at the end: {message}");
-        }
-    }
-}
-
-impl StudioApp {
-    /// Follows the pen no further; whether it was drawing.
-    fn lift_pen(&mut self) -> bool {
-        let memories = &mut self.panes.memories;
-        memories.images.lift_pen() | memories.scene.lift_pen()
-    }
-
-    /// Tells the model what is on screen now, and drops a cross-hair that no pane holds any more. `readout` is what the
-    /// status bar shows.
-    fn after_panes(&mut self, ctx: &egui::Context, readout: Option<&String>, out: &mut Vec<Command>) {
-        if self.panes.drawn != self.state.selection.panes {
-            out.push(Command::View(ViewCommand::ShowPanes(self.panes.drawn.clone())));
-        }
-        if self.state.selection.hover.is_some() && !self.shared.hover_claimed {
-            out.push(Command::View(ViewCommand::HoverPixel(None)));
-        }
-        if self.shared.readout.as_ref() != readout {
-            // The status bar was drawn before the pane under the pointer: once more, with the number in it.
-            ctx.request_repaint();
-        }
-        // What is made of clicks goes on while no button is down. A whole click may lie between two frames: then the state
-        // does not know yet of the drawing that it began.
-        let by_tool = self.state.settings.mask.tool == MaskTool::Polygon;
-        let by_clicks = self.state.document.stroke.as_ref().map_or(by_tool, |stroke| stroke.drawing.is_by_clicks());
-        if !by_clicks && !ctx.input(|i| i.pointer.any_down()) && self.lift_pen() {
-            out.push(Command::Labels(LabelsCommand::EndStroke));
-        }
     }
 }

@@ -11,8 +11,8 @@ use crate::app::command::{LibraryCommand, Pane, TasksCommand, ViewCommand};
 use crate::app::library::Place;
 use crate::app::settings::Theme;
 use crate::app::tasks::{RunningTask, Ticket};
+use crate::app::view::Purpose;
 use crate::ui::parts::cx::Cx;
-use crate::ui::parts::dialogs::Purpose;
 use crate::ui::parts::theme::{SMALL, caption, medium};
 use crate::ui::parts::widget::progress;
 

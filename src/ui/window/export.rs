@@ -1,17 +1,19 @@
 //! Taking things away: the menu in each pane's title.
 
-pub(crate) mod import;
-pub(crate) mod masks;
-
-use eframe::egui::{self, Ui};
+use eframe::egui::{self, DragValue, RichText, Ui, vec2};
+use strum::IntoEnumIterator as _;
 
 use crate::app::action::Action;
 use crate::app::command::{ExportCommand, Pane, UiRequest, ViewCommand};
-use crate::app::export;
-use crate::app::export::{Output, StillAsked};
+use crate::app::export::{self, Output, StillAsked};
 use crate::app::keys::ImprintSource;
 use crate::app::pane::Kind;
+use crate::app::results;
+use crate::app::state::Lookup;
 use crate::ui::parts::cx::Cx;
+use crate::ui::parts::theme::caption;
+use touch2touch_pipeline::export::{ExportChoice, Which};
+use touch2touch_pipeline::io::exchange::Format;
 use touch2touch_pipeline::still::WIDTH_PX;
 use touch2touch_pipeline::still::space::Ground;
 
@@ -72,6 +74,169 @@ pub(crate) fn menu(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane) {
         if copy.on_hover_text(tip).clicked() {
             ui.copy_text(command);
             ui.close();
+        }
+    }
+}
+
+/// A form beside the panes, in the middle at first; true where it was closed. It blocks nothing: pairs can be drawn and marked.
+fn form(ctx: &egui::Context, title: &str, add: impl FnOnce(&mut Ui)) -> bool {
+    let mut open = true;
+    let window = egui::Window::new(title).id(egui::Id::unique(("form", title))).open(&mut open);
+    let middle = ctx.content_rect().center();
+    let window = window.collapsible(false).resizable(false).pivot(egui::Align2::CENTER_CENTER).default_pos(middle);
+    window.show(ctx, |ui| {
+        ui.set_width(400.0);
+        ui.spacing_mut().item_spacing = vec2(8.0, 6.0);
+        add(ui);
+    });
+    !open
+}
+
+/// The form of an import of masks, where it is open: what would change is said before anything does.
+pub(crate) fn import_form(cx: &mut Cx<'_>, ctx: &egui::Context) {
+    let Some(asked) = cx.state.export.importing.clone() else { return };
+    let closed = form(ctx, "Import masks", |ui| {
+        ui.add(egui::Label::new(caption(asked.from.display().to_string(), cx.p)).wrap());
+        let mut over_drawn = asked.over_drawn;
+        let tip = "Off: hand-drawn pixels stay, and so do the masks of pairs that are done, flagged or skipped. Can be undone, \
+                   pair by pair";
+        let tick = ui.checkbox(&mut over_drawn, "also replace hand-drawn masks and reviewed pairs").on_hover_text(tip);
+        if tick.changed() {
+            cx.push(ExportCommand::ImportOverHand(over_drawn));
+        }
+        ui.separator();
+        let ready = import_plan(cx, ui);
+        ui.horizontal(|ui| {
+            let import = ui.add_enabled(ready, egui::Button::new("Import")).accessible_name("Import these masks");
+            let tip = "Makes them the masks of the measured imprints. No pair is marked done";
+            if import.on_hover_text(tip).clicked() {
+                cx.push(ExportCommand::Import);
+            }
+            if ui.button("Close").on_hover_text("Changes nothing").clicked() {
+                cx.push(ExportCommand::AskImport(None));
+            }
+        });
+    });
+    if closed {
+        cx.push(ExportCommand::AskImport(None));
+    }
+}
+
+/// Changes that the import would make; true where there are any.
+fn import_plan(cx: &Cx<'_>, ui: &mut Ui) -> bool {
+    let Some(key) = results::import_plan_key(cx.state) else { return false };
+    let mut line = |text: String, color| {
+        ui.add(egui::Label::new(RichText::new(text).size(12.0).color(color)).wrap());
+    };
+    match cx.state.look(key) {
+        Lookup::Ready(plan) | Lookup::Stale(plan) => {
+            line(format!("Format: {}", plan.format.name()), cx.p.text);
+            plan.lines().into_iter().for_each(|text| line(text, cx.p.text));
+            if plan.total() == 0 {
+                line("Nothing would change.".into(), cx.p.caution);
+            }
+            plan.total() > 0
+        }
+        Lookup::Failed(err) => {
+            line(err.to_string(), cx.p.wrong);
+            false
+        }
+        Lookup::Waiting | Lookup::Absent(_) => {
+            line("Reading the masks…".into(), cx.p.weak);
+            false
+        }
+    }
+}
+
+/// The form of an export of masks, where it is open: what goes where is said before anything is written.
+pub(crate) fn masks_form(cx: &mut Cx<'_>, ctx: &egui::Context) {
+    if !cx.state.export.asking_masks {
+        return;
+    }
+    let mut choice = cx.state.export.masks;
+    let closed = form(ctx, "Export masks", |ui| {
+        mask_choices(cx, ui, &mut choice);
+        ui.separator();
+        let ready = mask_plan(cx, ui);
+        ui.horizontal(|ui| {
+            let write = ui.add_enabled(ready, egui::Button::new("Choose folder…"));
+            let write = write.accessible_name("Choose the folder of the export");
+            let tip = format!(
+                "A new or empty folder, or a previous export. {}. Everything written is read back and checked.",
+                choice.format.text()
+            );
+            if write.on_hover_text(tip).clicked() {
+                cx.push(ExportCommand::Place(Output::Masks));
+            }
+            if ui.button("Close").on_hover_text("Writes nothing").clicked() {
+                cx.push(ExportCommand::AskMasks(false));
+            }
+        });
+    });
+    if choice != cx.state.export.masks {
+        cx.push(ExportCommand::SetMasks(choice));
+    }
+    if closed {
+        cx.push(ExportCommand::AskMasks(false));
+    }
+}
+
+fn mask_choices(cx: &Cx<'_>, ui: &mut Ui, choice: &mut ExportChoice) {
+    ui.horizontal(|ui| {
+        ui.label(caption("Masks", cx.p));
+        for (which, text, tip) in [
+            (Which::Done, "done", "Pairs marked \"done\" that have a mask drawn by hand"),
+            (Which::Begun, "done and in progress", "Also pairs whose mask was begun"),
+        ] {
+            let radio = ui.radio(choice.which == which, text);
+            if radio.on_hover_text(format!("{tip}. Never skipped or flagged pairs")).clicked() {
+                choice.which = which;
+            }
+        }
+    });
+    ui.horizontal(|ui| {
+        ui.label(caption("Format", cx.p));
+        for format in Format::iter() {
+            if ui.radio(choice.format == format, format.name()).on_hover_text(format.text()).clicked() {
+                choice.format = format;
+            }
+        }
+    });
+    let tip =
+        "Off: pairs reserved for tests (test_only) go to test, so that no model is scored on what it was trained on";
+    ui.checkbox(&mut choice.test_in_train, "train on pairs reserved for tests").on_hover_text(tip);
+    let tip = "So that scores are on tools the model was not trained on. Off: pairs are split one by one";
+    ui.checkbox(&mut choice.by_tool, "keep each tool in one split").on_hover_text(tip);
+    let tip = "All other pixels are written as ignored";
+    ui.checkbox(&mut choice.manual_checked, "only pixels painted by hand").on_hover_text(tip);
+    ui.horizontal(|ui| {
+        ui.label(caption("Split seed", cx.p));
+        let drag = ui.add(DragValue::new(&mut choice.seed).range(0..=999_999)).accessible_name("Split seed");
+        drag.on_hover_text("The same seed always gives the same split, also when pairs are added");
+    });
+}
+
+/// Division of the export; true where there is something to write.
+fn mask_plan(cx: &Cx<'_>, ui: &mut Ui) -> bool {
+    let Some(key) = results::mask_plan_key(cx.state) else { return false };
+    match cx.state.look(key) {
+        Lookup::Ready(plan) | Lookup::Stale(plan) => {
+            for line in plan.lines() {
+                ui.add(egui::Label::new(RichText::new(line).size(12.0).color(cx.p.text)).wrap());
+            }
+            if plan.total() == 0 {
+                let what = Action::DoneAndNext.behind("Nothing to write yet: edit a mask and mark its pair done");
+                ui.label(RichText::new(what).size(12.0).color(cx.p.caution));
+            }
+            plan.total() > 0
+        }
+        Lookup::Failed(err) => {
+            ui.label(RichText::new(err.to_string()).size(12.0).color(cx.p.wrong));
+            false
+        }
+        Lookup::Waiting | Lookup::Absent(_) => {
+            ui.label(caption("…", cx.p));
+            false
         }
     }
 }

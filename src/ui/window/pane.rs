@@ -12,7 +12,7 @@ use crate::app::results;
 use crate::app::state::{Absent, Lookup, State};
 use crate::ui::parts::cx::{Cx, side_color};
 use crate::ui::parts::made_with;
-use crate::ui::parts::theme::{SMALL, medium};
+use crate::ui::parts::theme::{SMALL, medium, pane_frame};
 use crate::ui::parts::widget::help;
 
 macro_rules! views {
@@ -78,7 +78,16 @@ fn show(cx: &mut Cx<'_>, ui: &mut Ui, panes: &mut Panes, pane: Pane) {
     let (place, below) = made_with::split(cx, ui.max_rect(), predicted || pane == Pane::Measured);
     ui.scope_builder(egui::UiBuilder::new().max_rect(place), |ui| {
         ui.set_clip_rect(place.intersect(ui.clip_rect()));
-        draw(cx, ui, &mut panes.memories, pane);
+        let memories = &mut panes.memories;
+        match pane.kind() {
+            Kind::Form => {
+                pane_frame(cx.p).show(ui, |ui| {
+                    ui.set_min_size(ui.available_size());
+                    draw(cx, ui, memories, pane);
+                });
+            }
+            _ => draw(cx, ui, memories, pane),
+        }
     });
     if let Some(below) = below.filter(|_| predicted) {
         made_with::show(cx, ui, pane.title(), place, below);

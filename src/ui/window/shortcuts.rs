@@ -2,21 +2,20 @@
 
 mod list;
 
-use eframe::egui::{self, Key as EKey};
+use eframe::egui::{self, Key};
 use strum::IntoEnumIterator as _;
 
 pub(crate) use self::list::{Memory, list};
-use crate::app::action::{Action, Key, Shortcut};
+use crate::app::action::{Action, Shortcut};
 use crate::app::pane::{Kind, Pane};
 
-/// The toolkit's name of a key.
-fn key_of(key: Key) -> EKey {
-    match key {
-        Key::Escape => EKey::Escape,
-        Key::Equals => EKey::Equals,
-        // The names are the same, but for these: the toolkit parses them.
-        other => EKey::from_name(&other.text()).or_else(|| EKey::from_name(&format!("{other:?}"))).unwrap_or(EKey::F35),
-    }
+/// The toolkit's key; `None` where it has none of that name.
+fn key_of(s: Shortcut) -> Option<Key> {
+    Key::from_name(match s.key {
+        "PgUp" => "PageUp",
+        "PgDn" => "PageDown",
+        own => own,
+    })
 }
 
 /// The place at which keys arrive.
@@ -46,32 +45,27 @@ pub(crate) fn pressed(ctx: &egui::Context, place: Place, possible: impl Fn(Actio
             Action::iter().filter(|a| possible(*a)).flat_map(|a| a.keys().iter().map(move |s| (a, *s))).collect();
         all.sort_by_key(|(_, s)| std::cmp::Reverse(u8::from(s.ctrl) + u8::from(s.shift) + u8::from(s.alt)));
         for (action, s) in all {
-            if typing && !s.ctrl && !s.key.is_function() {
-                continue;
-            }
-            if typing && s.key.is_for_text() {
-                continue;
-            }
-            if place.dialog && !s.ctrl && !s.key.is_function() && s.key != Key::Escape {
-                continue;
-            }
-            if !place.labeling && !s.ctrl && !s.alt && action.is_of_labeling() {
+            let bare = !s.ctrl && !s.is_function();
+            if (typing && (bare || s.is_for_text()))
+                || (place.dialog && bare && s.key != "Esc")
+                || (!place.labeling && !s.ctrl && !s.alt && action.is_of_labeling())
+            {
                 continue;
             }
             let mut hit = false;
             input.events.retain(|event| {
                 let egui::Event::Key { key, pressed: true, modifiers, .. } = event else { return true };
-                let same_key = *key == key_of(s.key)
-                    || (s.key == Key::Questionmark && *key == EKey::Slash && modifiers.shift)
-                    || (s.key == Key::Exclamationmark && *key == EKey::Num1 && modifiers.shift);
-                let shift_fits = s.key.is_shifted() || modifiers.shift == s.shift;
+                let same_key = Some(*key) == key_of(s)
+                    || (s.key == "?" && *key == Key::Slash && modifiers.shift)
+                    || (s.key == "!" && *key == Key::Num1 && modifiers.shift);
+                let shift_fits = s.is_shifted() || modifiers.shift == s.shift;
                 let ctrl_fits = (modifiers.ctrl || modifiers.command) == s.ctrl;
                 let fits = same_key && shift_fits && ctrl_fits && modifiers.alt == s.alt && possible(action);
                 hit |= fits;
                 !fits
             });
             // Copy and the like arrive as events of their own.
-            if s == (Shortcut { ctrl: true, shift: false, alt: false, key: Key::C }) && !typing {
+            if s == (Shortcut { ctrl: true, shift: false, alt: false, key: "C" }) && !typing {
                 let before = input.events.len();
                 input.events.retain(|e| !matches!(e, egui::Event::Copy));
                 hit |= before != input.events.len();
@@ -96,8 +90,8 @@ mod tests {
 
     #[test]
     fn every_key_is_known_to_the_toolkit() {
-        for key in Key::iter() {
-            assert_ne!(key_of(key), EKey::F35, "{key:?}");
+        for shortcut in Action::iter().flat_map(Action::keys) {
+            assert!(key_of(*shortcut).is_some(), "{shortcut}");
         }
     }
 
@@ -106,11 +100,11 @@ mod tests {
         Modifiers { alt: s.alt, ctrl: s.ctrl, shift: s.shift, mac_cmd: false, command: s.ctrl }
     }
 
-    fn press(key: EKey, modifiers: Modifiers) -> Vec<Action> {
+    fn press(key: Key, modifiers: Modifiers) -> Vec<Action> {
         press_at(Place { labeling: true, ..Place::default() }, key, modifiers)
     }
 
-    fn press_at(place: Place, key: EKey, modifiers: Modifiers) -> Vec<Action> {
+    fn press_at(place: Place, key: Key, modifiers: Modifiers) -> Vec<Action> {
         let ctx = egui::Context::default();
         let mut raw = egui::RawInput::default();
         raw.events.push(egui::Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers });
@@ -125,14 +119,14 @@ mod tests {
     fn no_letter_changes_labels_where_no_mask_is_drawn_and_none_acts_under_a_dialog() {
         let mut letters = 0;
         for action in Action::iter() {
-            for s in action.keys().iter().filter(|s| !s.ctrl && !s.key.is_function()) {
+            for s in action.keys().iter().filter(|s| !s.ctrl && !s.is_function()) {
                 let mut m = modifiers(*s);
-                m.shift |= s.key.is_shifted();
-                let at = |place| press_at(place, key_of(s.key), m);
+                m.shift |= s.is_shifted();
+                let at = |place| press_at(place, key_of(*s).unwrap(), m);
                 let elsewhere = if action.is_of_labeling() && !s.alt { vec![] } else { vec![action] };
                 letters += usize::from(elsewhere.is_empty());
                 assert_eq!(at(Place::default()), elsewhere, "{s}");
-                let escape = if s.key == Key::Escape { vec![action] } else { vec![] };
+                let escape = if s.key == "Esc" { vec![action] } else { vec![] };
                 assert_eq!(at(Place { dialog: true, labeling: true, ..Place::default() }), escape, "{s}");
             }
         }
@@ -167,13 +161,13 @@ mod tests {
         let preedit = |text: &str| ime(egui::ImeEvent::Preedit { text: text.into(), active_range_chars: None });
         frame(Vec::new());
         for letters in ["n", "ni", "nih"] {
-            frame(vec![preedit(letters), key(EKey::B), key(EKey::C), key(EKey::H)]);
+            frame(vec![preedit(letters), key(Key::B), key(Key::C), key(Key::H)]);
         }
-        frame(vec![preedit("nihao"), key(EKey::Enter)]);
+        frame(vec![preedit("nihao"), key(Key::Enter)]);
         let typed = frame(vec![ime(egui::ImeEvent::Commit("né".into()))]);
         assert_eq!((typed.as_str(), got), ("né", Vec::new()));
         // Without a text these keys are actions.
-        assert!([EKey::B, EKey::C, EKey::H].iter().all(|key| !press(*key, Modifiers::NONE).is_empty()));
+        assert!([Key::B, Key::C, Key::H].iter().all(|key| !press(*key, Modifiers::NONE).is_empty()));
     }
 
     #[test]
@@ -181,10 +175,10 @@ mod tests {
         for action in Action::iter() {
             for s in action.keys() {
                 let mut m = modifiers(*s);
-                m.shift |= s.key.is_shifted();
-                assert_eq!(press(key_of(s.key), m), vec![action], "{s}");
+                m.shift |= s.is_shifted();
+                assert_eq!(press(key_of(*s).unwrap(), m), vec![action], "{s}");
             }
         }
-        assert_eq!(press(EKey::Slash, Modifiers::SHIFT), vec![Action::ShortcutSheet]);
+        assert_eq!(press(Key::Slash, Modifiers::SHIFT), vec![Action::ShortcutSheet]);
     }
 }

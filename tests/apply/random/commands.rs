@@ -13,18 +13,16 @@ use touch2touch::app::command::{
     LabelsCommand, LearnCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand, TasksCommand, UiRequest,
     UnsavedCommand, ViewCommand, WorkbenchCommand,
 };
-use touch2touch::app::doctor::{Examine, ReadOtherwise, TryModels};
 use touch2touch::app::effect::{LabelsToSave, NotSaved, TaskResult};
-use touch2touch::app::evaluate::{Score, ScoreChoice};
+use touch2touch::app::evaluate::ScoreChoice;
 use touch2touch::app::export::{Output, StillAsked};
 use touch2touch::app::keys::{
     DatasetSeq, ImprintSource, PairKey, PredictionKey, Registration, Revision, ShiftMode, TouchKey,
 };
 use touch2touch::app::keys::{PictureKey, Preview};
-use touch2touch::app::labels::{ImportMasks, PairLabels, Review, StrokeIn3d};
-use touch2touch::app::learn::{AdaptPairs, Learn, LearnForm, Learned, Network};
-use touch2touch::app::library::{Open, Place, ReadTool, Sort};
-use touch2touch::app::predict::{Generate, Refit};
+use touch2touch::app::labels::{PairLabels, Review, StrokeIn3d};
+use touch2touch::app::learn::{AdaptPairs, LearnForm, Learned, Network};
+use touch2touch::app::library::{Place, Sort};
 use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{
     Change, ColorMap, ColorRange, CompareChoice, CompareMode, GelView, GenerateSettings, Last, MaskChoice,
@@ -32,8 +30,9 @@ use touch2touch::app::settings::{
 };
 use touch2touch::app::source::{Followed, Source};
 use touch2touch::app::state::results::{Computed, Request};
-use touch2touch::app::tasks::{TaskKind, Ticket, Write};
+use touch2touch::app::tasks::{TaskKind, Ticket};
 use touch2touch::app::workbench::{Layer, Picked, SceneTool};
+use touch2touch::app::{doctor, evaluate, export, learn, library, predict, tasks};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::evaluation::Metric;
@@ -322,28 +321,32 @@ fn followed() -> Followed {
 fn ended() -> impl Strategy<Value = TaskResult> {
     (any_of::<TaskKind>(), select(vec!["tool_a/data_0", "elsewhere"]), select(vec![DatasetSeq(1), NEVER])).prop_map(
         |(kind, name, seq)| match kind {
-            TaskKind::Open => TaskResult::of::<Open>((NEVER, Place::Path(name.into()), demo())),
+            TaskKind::Open => TaskResult::new(kind, (NEVER, Place::Path(name.into()), demo()), library::opened),
             TaskKind::ReadTool => {
                 let (tool, word, file) = ("tool_a".into(), "mm".into(), "unit.txt".into());
                 let set = UnitSet { tool, unit: ToolUnit::Millimeters, file, word, not_written: None };
-                TaskResult::of::<ReadTool>((seq, set))
+                TaskResult::new(kind, (seq, set), library::tool_read)
             }
-            TaskKind::Generate => TaskResult::of::<Generate>(Vec::new()),
-            TaskKind::Refit => TaskResult::of::<Refit>((statistics(), None)),
-            TaskKind::Write => TaskResult::of::<Write>(("Something".into(), "/dev/null/folder".into())),
-            TaskKind::Import => {
-                TaskResult::of::<ImportMasks>(Import { new: 1, changed: vec![name.to_owned()], ..Import::default() })
-            }
-            TaskKind::Evaluate => TaskResult::of::<Score>(Arc::new(evaluation())),
-            TaskKind::TryModels => TaskResult::of::<TryModels>(Some(Arc::new(Worth::default()))),
-            TaskKind::Examine => TaskResult::of::<Examine>(Arc::new(Examined::default())),
+            TaskKind::Generate => TaskResult::new(kind, Vec::new(), predict::generated),
+            TaskKind::Refit => TaskResult::new(kind, (statistics(), None), predict::refitted),
+            TaskKind::Write => TaskResult::new(kind, ("Something".into(), "/dev/null/folder".into()), tasks::written),
+            TaskKind::Import => TaskResult::new(
+                kind,
+                Import { new: 1, changed: vec![name.to_owned()], ..Import::default() },
+                export::imported,
+            ),
+            TaskKind::Evaluate => TaskResult::new(kind, Arc::new(evaluation()), evaluate::scored),
+            TaskKind::TryModels => TaskResult::new(kind, Some(Arc::new(Worth::default())), doctor::tried),
+            TaskKind::Examine => TaskResult::new(kind, Arc::new(Examined::default()), doctor::examined),
             TaskKind::ReadOtherwise => {
-                TaskResult::of::<ReadOtherwise>((seq, "read-as.txt".into(), "swap-fingers".into()))
+                TaskResult::new(kind, (seq, "read-as.txt".into(), "swap-fingers".into()), doctor::read_otherwise)
             }
-            TaskKind::Learn if seq.0 % 2 == 0 => TaskResult::of::<Learn>(Learned::Generator(Arc::new(adapted()), None)),
+            TaskKind::Learn if seq.0 % 2 == 0 => {
+                TaskResult::new(kind, Learned::Generator(Arc::new(adapted()), None), learn::learned)
+            }
             TaskKind::Learn => {
                 let bundle = models().remove(1);
-                TaskResult::of::<Learn>(Learned::Masks(Arc::new(trained()), bundle))
+                TaskResult::new(kind, Learned::Masks(Arc::new(trained()), bundle), learn::learned)
             }
         },
     )
@@ -433,7 +436,7 @@ draws! {
     labels: LabelsCommand {
         6 BeginStroke(finger(), source(), position(), any::<bool>()),
         4 BeginIn3d((finger(), source(), position(), point(), any::<bool>()).prop_map(|(finger, source, at_px, size_at, erase)| {
-            let sight = Sight { clip_from_grasp: Mat4::IDENTITY, size_px: [64, 48], layers: Layers::All, cut: Vec::new() };
+            let sight = Sight { clip_from_grasp: Mat4::IDENTITY, size_px: [64, 48], layers: Layers::All };
             Box::new(StrokeIn3d { finger, source, sight, at_px, size_at, erase })
         })),
         6 StrokeTo(position()),
@@ -458,9 +461,7 @@ draws! {
         1 Start(proptest::option::of(planar())),
         1 Run(0usize..4),
         1 Go(0usize..4, 0usize..100),
-        1 By(any::<i64>()),
-        1 Begin,
-        1 End,
+        1 By(prop_oneof![any::<i64>(), Just(i64::MIN), Just(i64::MAX)]),
         1 Play(any::<bool>()),
     }
     workbench: WorkbenchCommand {

@@ -3,7 +3,7 @@
 
 use std::collections::HashMap;
 
-use glam::{DMat4, DVec2, DVec3, DVec4, Mat4, Vec4};
+use glam::{DMat4, DVec2, DVec3, DVec4, Mat4};
 use serde::{Deserialize, Serialize};
 use strum::EnumIter;
 
@@ -58,9 +58,6 @@ pub struct Sight {
     /// Layers that are reached.
     #[serde(default)]
     pub layers: Layers,
-    /// Planes that cut it open: what has `xyz · p + w < 0` (meters) is neither reached nor hides anything.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub cut: Vec<Vec4>,
 }
 
 /// A matrix in double precision, so that it is taken apart once for many points.
@@ -109,10 +106,6 @@ impl Sight {
     pub fn px_per_m(&self, p_in_grasp: DVec3) -> Option<f64> {
         Projection::of(self).px_per_m(p_in_grasp)
     }
-
-    fn cuts_away(&self, p: DVec3) -> bool {
-        self.cut.iter().any(|plane| plane.as_dvec4().dot(p.extend(1.0)) < 0.0)
-    }
 }
 
 /// Pixels of one finger's mask that a drawing on a picture reaches, with their places in it.
@@ -129,7 +122,7 @@ impl VisiblePixels {
     /// each), as far as they are reached; `others` are points of other fingers, which can hide them.
     pub fn new(sight: &Sight, (own, pixels): (&[DVec3], &[[u16; 2]]), others: &[&[DVec3]]) -> Self {
         let projection = Projection::of(sight);
-        let place = |p: &DVec3| projection.place(*p).filter(|_| !sight.cuts_away(*p));
+        let place = |p: &DVec3| projection.place(*p);
         let placed: Vec<([u16; 2], DVec2, f64)> = own
             .iter()
             .zip(pixels)
@@ -215,7 +208,7 @@ pub(super) mod testing {
             DVec4::new(0.0, 0.0, 0.0, -1.0),
             DVec4::new(0.0, 0.0, 0.01, eye),
         );
-        Sight { clip_from_grasp: clip.as_mat4(), size_px: [400, 300], layers, cut: Vec::new() }
+        Sight { clip_from_grasp: clip.as_mat4(), size_px: [400, 300], layers }
     }
 
     /// A sheet of 21 x 21 points half a millimeter apart around the axis, at a height.
@@ -271,11 +264,6 @@ mod tests {
         // A fold of one sheet hides its own back.
         let both = ([near.0.clone(), far.0].concat(), [near.1.clone(), far.1].concat());
         assert_eq!(reached(&both, &[], Layers::Front), reached(&near, &[], Layers::Front));
-        // What a plane cuts away is not reached, and hides nothing.
-        let cut = Sight { cut: vec![Vec4::new(0.0, 0.0, -1.0, 0.0)], ..from_above(4000.0, Layers::Front) };
-        let far = sheet(-0.005);
-        assert_eq!(stamp(&VisiblePixels::new(&cut, (&far.0, &far.1), &[&near.0]), CENTER, 9.0), all);
-        assert_eq!(stamp(&VisiblePixels::new(&cut, (&near.0, &near.1), &[]), CENTER, 9.0), 0);
     }
 
     #[test]

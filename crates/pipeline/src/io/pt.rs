@@ -228,17 +228,14 @@ impl PtDict {
     /// # Errors
     /// [`FileErrorKind::Missing`] where there is none, or another value (numpy's among them); else its values cannot be read.
     pub fn tensor(&self, key: &str) -> Result<Tensor, FileError> {
-        match self.items.get(key) {
-            Some(Item::Tensor(place)) => self.whole(key, place),
-            Some(Item::Float(x)) => Ok(Tensor::f64(&[], vec![*x])),
-            Some(Item::Int(x)) => Ok(Tensor { shape: vec![], values: Values::I64(vec![*x]) }),
-            Some(Item::Bool(x)) => Ok(Tensor::u8(&[], vec![u8::from(*x)])),
-            Some(Item::Other(found)) => Err(self.no_tensor(key, &clip(found))),
-            None => Err(self.missing(key)),
-        }
-    }
-
-    fn whole(&self, key: &str, Place { storage, dtype, offset, shape, strides }: &Place) -> Result<Tensor, FileError> {
+        let Place { storage, dtype, offset, shape, strides } = match self.items.get(key) {
+            Some(Item::Tensor(place)) => place,
+            Some(Item::Float(x)) => return Ok(Tensor::f64(&[], vec![*x])),
+            Some(Item::Int(x)) => return Ok(Tensor { shape: vec![], values: Values::I64(vec![*x]) }),
+            Some(Item::Bool(x)) => return Ok(Tensor::u8(&[], vec![u8::from(*x)])),
+            Some(Item::Other(found)) => return Err(self.no_tensor(key, &clip(found))),
+            None => return Err(self.missing(key)),
+        };
         let bad = |reason: String| self.bad(key, reason);
         // A view can repeat one value of the file for ever.
         let values = product(shape);

@@ -9,7 +9,7 @@ use touch2touch_core::cloud;
 use touch2touch_core::grid::{DepthMap, Mask};
 use touch2touch_core::label::{Sight, VisiblePixels};
 use touch2touch_core::rig::{PadId, PerPad};
-use touch2touch_core::sample::{DepthCamera, Sample};
+use touch2touch_core::sample::Sample;
 
 const WHAT: &str = "Point cloud";
 
@@ -58,40 +58,24 @@ impl FingerCloud {
     }
 }
 
-/// The surface points of one finger, with the contact points marked. `None` for the mask marks none.
+/// The surface points of both fingers of a sample: `parts` holds imprint and mask; a finger without a
+/// camera is left out, and without a mask no point is of contact.
 ///
 /// # Errors
 /// If the sizes differ or the camera's numbers cannot be right.
-pub(crate) fn finger_cloud(
-    imprint: &DepthMap,
-    camera: &DepthCamera,
-    mask: Option<&Mask>,
-) -> Result<FingerCloud, TaskError> {
-    let lifted = cloud::lift(imprint, camera, None).map_err(|err| TaskError::from_error(WHAT, &err))?;
-    if let Some(mask) = mask.filter(|mask| mask.size() != imprint.size()) {
-        let why = format!("the mask has {:?} pixels, the imprint {:?}", mask.size(), imprint.size());
-        return Err(TaskError::new(WHAT, why).with_hint("Remove the correction of this mask."));
-    }
-    let contact = lifted
-        .pixels
-        .iter()
-        .map(|&[x, y]| mask.is_some_and(|m| m.get(x.into(), y.into()).is_some_and(|&contact| contact)))
-        .collect();
-    Ok(FingerCloud { points: lifted.points, pixels: lifted.pixels, contact })
-}
-
-/// The surface points of both fingers of a sample: `parts` holds imprint and mask; a finger without a
-/// camera is left out.
-///
-/// # Errors
-/// As [`finger_cloud`].
 pub fn clouds(sample: &Sample, parts: &PerPad<(&DepthMap, Option<&Mask>)>) -> Result<Clouds, TaskError> {
     let mut clouds = Clouds::default();
     for finger in sample.rig.pads() {
         let camera = sample.pad(finger).and_then(|t| t.camera());
-        if let (Some((imprint, mask)), Some(camera)) = (parts[finger], camera) {
-            clouds.fingers[finger] = Some(finger_cloud(imprint, camera, mask)?);
+        let (Some((imprint, mask)), Some(camera)) = (parts[finger], camera) else { continue };
+        let lifted = cloud::lift(imprint, camera, None).map_err(|err| TaskError::from_error(WHAT, &err))?;
+        if let Some(mask) = mask.filter(|mask| mask.size() != imprint.size()) {
+            let why = format!("the mask has {:?} pixels, the imprint {:?}", mask.size(), imprint.size());
+            return Err(TaskError::new(WHAT, why).with_hint("Remove the correction of this mask."));
         }
+        let is_contact = |&[x, y]: &[u16; 2]| mask.is_some_and(|m| m.get(x.into(), y.into()).is_some_and(|&c| c));
+        let contact = lifted.pixels.iter().map(is_contact).collect();
+        clouds.fingers[finger] = Some(FingerCloud { points: lifted.points, pixels: lifted.pixels, contact });
     }
     Ok(clouds)
 }
@@ -131,7 +115,7 @@ pub fn images<'a>(sample: &'a Sample, imprints: &PerPad<&'a DepthMap>, source: I
 /// Points of the other fingers can hide them.
 ///
 /// # Errors
-/// If the finger has no imprint or no camera, or as [`finger_cloud`].
+/// If the finger has no imprint or no camera, or as [`clouds`].
 pub fn seen(
     sample: &Sample,
     imprints: &PerPad<&DepthMap>,

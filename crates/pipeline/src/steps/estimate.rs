@@ -10,7 +10,7 @@ use crate::infer::mask::contact_of;
 use crate::io::dataset::Dataset;
 use crate::job::JobCx;
 use crate::labels::{ImprintSource, PairLabels};
-use crate::steps::cloud::{Clouds, images};
+use crate::steps::cloud::{Clouds, contact_points, images};
 use crate::steps::imprint::{imprints_of, measured};
 use crate::steps::mask::{Contact, MaskInputs, contact_mask, no_mask_model};
 use crate::steps::models::Models;
@@ -227,7 +227,9 @@ impl Estimate {
                 }
                 Stage::Mask => self.contact = Some(Arc::new(self.masks(touch, models)?)),
                 Stage::Cloud => {
-                    self.points = self.contact.as_ref().map(|contact| Arc::new(contact.points(sample)));
+                    let Contact { imprints, masks, .. } = self.contact();
+                    let masks = masks.as_ref().map(|found| Some(&*found?.mask));
+                    self.points = Some(Arc::new(contact_points(sample, &imprints.as_ref(), &masks)));
                 }
                 Stage::Pose => {
                     let by = self.recipe.registration.method();
@@ -309,7 +311,6 @@ impl Estimate {
     fn masks(&mut self, touch: Touch<'_>, models: &Models) -> Result<Contact, TaskError> {
         let made_by = self.recipe.mask_recipe(&touch.sample.rig)?;
         let of = self.recipe.imprint_of();
-        // Drawn ones are left out where the recipe says so.
         let labels = self.recipe.hand.then_some(touch.labels);
         let inputs = MaskInputs { sample: touch.sample, tool: touch.tool.ok(), labels, of: Some(&of) };
         let (imprints, unmasked, mut masks) = (self.imprints.clone(), self.unmasked.clone(), PerPad::default());

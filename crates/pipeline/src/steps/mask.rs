@@ -5,13 +5,12 @@
 
 use std::sync::Arc;
 
-use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use strum::{EnumIter, EnumString, IntoStaticStr};
 
 use crate::error::TaskError;
 use crate::labels::{DrawnMask, ImprintOf, MaskPlace, PairLabels};
-use crate::steps::cloud::{Clouds, clouds, contact_points};
+use crate::steps::cloud::{Clouds, clouds};
 use touch2touch_core::bits::Bits;
 use touch2touch_core::contact::{self, ContactMask, LAB_CAD_DISTANCE_M, MaskBasis};
 use touch2touch_core::grid::{DepthMap, Mask};
@@ -242,22 +241,6 @@ pub fn contact_mask(
     if let Some(hand) = inputs.drawn(pad, imprint) {
         return Ok(ContactMask { mask: hand.mask.clone(), basis: MaskBasis::Hand, unsure: None });
     }
-    match recipe {
-        MaskRecipe::Unet(..) => unet(imprint),
-        _ => without_model(recipe, imprint, pad, inputs),
-    }
-}
-
-/// The mask of a recipe that needs no model, and what it is made of in the end: a flat imprint has no contact.
-///
-/// # Errors
-/// If something the recipe needs is not there, or the sizes differ.
-fn without_model(
-    recipe: &MaskRecipe,
-    imprint: &DepthMap,
-    pad: PadId,
-    inputs: MaskInputs<'_>,
-) -> Result<ContactMask, TaskError> {
     let touch = inputs.sample.pad(pad);
     let mask = match recipe {
         MaskRecipe::Threshold(min_m) => contact::threshold(imprint, min_m.get()),
@@ -281,8 +264,9 @@ fn without_model(
                 .ok_or_else(|| TaskError::new(WHAT, "only simulated data knows the true contact"))?;
             truth.contact.clone()
         }
-        MaskRecipe::Unet(..) => return Err(TaskError::new(WHAT, "the mask model is needed")),
+        MaskRecipe::Unet(..) => return unet(imprint),
     };
+    // A flat imprint has no contact.
     Ok(contact::settled(imprint, mask, contact::flat_m(&inputs.sample.rig)))
 }
 
@@ -337,14 +321,6 @@ impl Contact {
         let note =
             |(pad, found): (PadId, &ContactMask)| Some(format!("{} finger: {}", rig.pad_key(pad), found.basis.note()?));
         self.masks.entries().filter_map(note).collect()
-    }
-
-    /// The contact points of the pair in the grasp frame, meters.
-    ///
-    /// # Errors
-    /// As [`contact_points`].
-    pub fn points(&self, sample: &Sample) -> Result<Vec<DVec3>, TaskError> {
-        contact_points(sample, &self.imprints.as_ref(), &self.masks.as_ref().map(|found| Some(&*found?.mask)))
     }
 
     /// All surface points of the pair, with the contact points marked.

@@ -7,7 +7,7 @@ use glam::{DAffine3, DVec3};
 use crate::error::TaskError;
 use touch2touch_core::align::{AlignReport, Ask, Contacts, Evidence, PointFit, Register, Scene, TraceStep};
 use touch2touch_core::frames::PlanarPose;
-use touch2touch_core::pose::{ToolModel, register_with};
+use touch2touch_core::pose::ToolModel;
 use touch2touch_core::units;
 use touch2touch_core::verdict::Verdict;
 
@@ -88,13 +88,13 @@ pub fn pose<'a>(
 ) -> Result<PoseResult, TaskError> {
     let contacts = contacts.into();
     let start = Instant::now();
-    let alone = Ask { evidence: false, ..ask };
-    let found = register_with(registration, contacts, tool, alone);
+    let scene = Scene::new(contacts);
+    let found = registration.run(&scene, tool, Ask { evidence: false, ..ask });
     let mut report = found.map_err(|err| TaskError::from_error("Pose", &err))?;
     // The time of the registration, not that of its evidence.
     let ms = start.elapsed().as_secs_f64() * 1e3;
     if ask.evidence {
-        Evidence::gather(&Scene::new(contacts), tool, &mut report);
+        Evidence::gather(&scene, tool, &mut report);
     }
     let angle_rad = report.lab_angle_rad();
     let truth_rad = truth.map(|t| t.inverse().theta_rad);

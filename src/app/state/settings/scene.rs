@@ -30,23 +30,17 @@ pub enum SceneLayer {
     Guides,
 }
 
-/// The look of all 3D views.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct SceneLook {
-    /// The layers that are not drawn.
-    pub hidden: BTreeSet<SceneLayer>,
-    /// Parallel projection.
-    pub orthographic: bool,
-    /// True where only what the GelSlims see is drawn.
-    pub only_window: bool,
-    /// The scale of distances reaches as far to both sides, meters.
-    pub distance_m: f32,
-}
-
-impl Default for SceneLook {
-    fn default() -> Self {
-        Self { hidden: BTreeSet::new(), orthographic: false, only_window: false, distance_m: 0.001 }
+with_defaults! {
+    /// The look of all 3D views.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(default)]
+    pub struct SceneLook {
+        /// The layers that are not drawn.
+        pub hidden: BTreeSet<SceneLayer> = BTreeSet::new(),
+        /// Parallel projection.
+        pub orthographic: bool = false,
+        /// The scale of distances reaches as far to both sides, meters.
+        pub distance_m: f32 = 0.001,
     }
 }
 

@@ -1,6 +1,10 @@
 //! The generator in the pane Adapt: the pairs that it is fitted to, and what the fit is worth.
 
-use eframe::egui::{self, Align2, FontId, Rect, RichText, Role, Sense, Ui, WidgetInfo, vec2};
+use std::hash::Hash;
+
+use eframe::egui::{
+    self, Align2, Color32, FontId, Painter, Pos2, Rect, Response, RichText, Role, Sense, Ui, WidgetInfo, pos2, vec2,
+};
 use strum::IntoEnumIterator as _;
 
 use super::super::images::{map_of, range_of};
@@ -10,9 +14,12 @@ use crate::app::learn::{self, AdaptPairs, Network, TUNING_STEPS};
 use crate::app::tasks::TaskKind;
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{SMALL, caption, section};
-use crate::ui::parts::thumbnail;
+use crate::ui::parts::widget::choice::choose;
 use crate::ui::parts::widget::empty;
-use touch2touch_core::units::{fixed, mm};
+use crate::ui::parts::widget::texture::depth_image;
+use touch2touch_core::colormap::{ColorMap, Range};
+use touch2touch_core::grid::DepthMap;
+use touch2touch_core::units::{self, fixed, mm};
 use touch2touch_pipeline::learn::adapt::{Adapted, ENOUGH_PAIRS, Remark, Scored};
 
 /// Between pictures, points.
@@ -91,8 +98,8 @@ fn before_and_after(cx: &mut Cx<'_>, ui: &mut Ui) {
         let response = ui.interact(rect, ui.scope_id().with(("held back", i)), Sense::hover());
         response.widget_info(|| WidgetInfo::labeled(Role::Image, true, name));
         let recipe = (held.pair, held.pad, fit);
-        thumbnail::depth(cx, ui.painter(), rect, ("held back", i), recipe, (picture, map, range));
-        thumbnail::readout(cx, &response, name, picture);
+        picture_of_depth(cx, ui.painter(), rect, ("held back", i), recipe, (picture, map, range));
+        readout(cx, &response, name, picture);
     }
     let pad = state.rig().pad_key(held.pad).into_owned();
     let text = format!("{} {pad}; choose another pair in the list to see it", held.name);
@@ -107,12 +114,8 @@ pub(super) fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
         ui.spacing_mut().item_spacing = vec2(8.0, 4.0);
         ui.label(caption("Fit to", cx.p));
         let combo = egui::ComboBox::from_id_salt("fitted pairs").width(130.0).selected_text(before.pairs.label());
-        let response = combo.show_ui(ui, |ui| {
-            for pairs in AdaptPairs::iter() {
-                ui.selectable_value(&mut form.pairs, pairs, pairs.label());
-            }
-        });
-        response.response.accessible_name("Pairs to fit to").on_hover_text("Which pairs the model is fitted to");
+        let (name, said) = (("Pairs to fit to", "Which pairs the model is fitted to"), |p: &AdaptPairs| (p.label(), ""));
+        form.pairs = choose(ui, combo, name, Some(&form.pairs), AdaptPairs::iter(), said).unwrap_or(form.pairs);
         let count = learn::pairs(cx.state).count();
         let text = RichText::new(format!("{count} pairs")).size(SMALL);
         let text = if count < ENOUGH_PAIRS { text.color(cx.p.caution) } else { text.color(cx.p.weak) };
@@ -216,4 +219,29 @@ fn remarks(cx: &Cx<'_>, ui: &mut Ui, adapted: &Adapted) {
     };
     list("Pairs that disagree with the others", &adapted.doubtful);
     list("Pairs not used", &adapted.left_out);
+}
+
+/// Draws one into `rect`; made again only where `recipe` (what it shows) or its colors changed.
+fn picture_of_depth(
+    cx: &mut Cx<'_>,
+    painter: &Painter,
+    rect: Rect,
+    slot: impl Hash,
+    recipe: impl Hash,
+    (image, map, range): (&DepthMap, ColorMap, Range),
+) {
+    let key = (recipe, map, range.lo.to_bits(), range.hi.to_bits());
+    let texture = cx.shared.textures.get(painter.ctx(), slot, key, false, || (depth_image(image, map, range), None));
+    painter.image(texture.texture.id(), rect, Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0)), Color32::WHITE);
+}
+
+/// Says the value under the pointer in the status bar.
+fn readout(cx: &mut Cx<'_>, response: &Response, name: &str, image: &DepthMap) {
+    let Some(pos) = response.hover_pos() else { return };
+    let share = (pos - response.rect.min) / response.rect.size();
+    let [w, h] = image.size();
+    let (x, y) = ((share.x * w as f32) as usize, (share.y * h as f32) as usize);
+    if let Some(value) = image.get(x, y).filter(|v| v.is_finite()) {
+        cx.shared.readout = Some(format!("{name} ({x}, {y})   {}", units::text_mm(f64::from(*value))));
+    }
 }

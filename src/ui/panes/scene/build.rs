@@ -10,11 +10,9 @@ use crate::app::keys::{DatasetSeq, EstimateKey, ImprintKey, ImprintSource};
 use crate::app::results;
 use crate::app::settings::SceneLayer;
 use crate::app::workbench::Layer;
-use crate::gpu::edges::EdgeStyle;
 use crate::gpu::mesh::{Look, MeshItem, MeshStyle, Shading};
 use crate::gpu::points::{CloudItem, CloudStyle, PointColors, PointSize};
 use crate::gpu::scene::SceneData;
-use crate::gpu::view::Plane;
 use crate::spatial::items;
 use crate::ui::parts::cx::{Cx, side_color};
 use crate::ui::parts::theme::{self, CONTACT};
@@ -31,8 +29,6 @@ pub(super) struct SceneCloud {
     pub revision: u64,
     /// The contact points of each finger.
     pub fingers: PerPad<Arc<[DVec3]>>,
-    /// Window of the GelSlims on it: smallest and largest y and z, grasp frame.
-    pub window: Option<[DVec3; 2]>,
 }
 
 /// The membranes of a cloud as surfaces, made only while they are shown, and not again for another mask.
@@ -60,12 +56,11 @@ pub(super) fn update_cloud(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSour
         return;
     }
     memory.revision += 1;
-    *held = Some(SceneCloud {
-        key,
-        revision: memory.revision,
-        fingers: contact_points(clouds),
-        window: window(cx, clouds),
-    });
+    let contact = |f: &FingerCloud| {
+        f.points.iter().zip(&f.contact).filter(|(_, contact)| **contact).map(|(point, _)| *point).collect()
+    };
+    let fingers = clouds.fingers.as_ref().map(|cloud| cloud.map(contact));
+    *held = Some(SceneCloud { key, revision: memory.revision, fingers });
 }
 
 /// The membranes as surfaces, made again only for other imprints.
@@ -88,31 +83,6 @@ fn update_surface(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource, key: 
     }
     memory.revision += 1;
     *held = Some(SceneSurface { key, revision: memory.revision, fingers });
-}
-
-/// The contact points of each finger.
-fn contact_points(clouds: &Clouds) -> PerPad<Arc<[DVec3]>> {
-    let contact = |f: &FingerCloud| {
-        f.points.iter().zip(&f.contact).filter(|(_, contact)| **contact).map(|(point, _)| *point).collect()
-    };
-    clouds.fingers.as_ref().map(|cloud| cloud.map(contact))
-}
-
-/// The box around the points that the color sensors see; x is left open.
-fn window(cx: &Cx<'_>, clouds: &Clouds) -> Option<[DVec3; 2]> {
-    let rig = cx.state.rig();
-    let size = rig.depth()?.size();
-    let mut bounds: Option<[DVec3; 2]> = None;
-    for (pad, cloud) in clouds.fingers.entries() {
-        let Some(seen) = rig.seen_mask(pad, size) else { continue };
-        for (p, pixel) in cloud.points.iter().zip(&cloud.pixels).filter(|(p, _)| p.is_finite()) {
-            if seen.get(pixel[0].into(), pixel[1].into()) == Some(&true) {
-                let [lo, hi] = bounds.unwrap_or([*p, *p]);
-                bounds = Some([lo.min(*p), hi.max(*p)]);
-            }
-        }
-    }
-    bounds
 }
 
 /// Makes the CAD model for the renderer, where it is another one.
@@ -149,35 +119,39 @@ pub(super) fn color(cx: &Cx<'_>, source: ImprintSource, layer: SceneLayer) -> Co
 /// Everything one side shows.
 pub(super) fn scene_of(cx: &Cx<'_>, memory: &Memory, source: ImprintSource) -> SceneData {
     let mut scene = SceneData { background: rgb(cx.p.canvas), eye_dome: true, ..SceneData::default() };
-    scene.cut = cut(cx, memory, source);
     clouds(cx, memory, source, &mut scene);
-    surfaces(cx, memory, source, &mut scene);
-    pointed(cx, source, &mut scene);
-    picked(cx, source, &mut scene);
+    if let Some(held) = &memory.surfaces[source as usize] {
+        const OPACITY: f32 = 0.4;
+        let color = rgb(color(cx, source, SceneLayer::Membrane));
+        for (finger, mesh) in held.fingers.entries() {
+            let finger = cx.state.finger_name(finger);
+            scene.meshes.push(items::membrane(&finger, (held.revision, mesh.clone()), color, OPACITY));
+        }
+    }
+    // The pixel under the pointer and the one that was clicked are points of their own: they must not drown among the others.
+    let at = |finger, [x, y]: [usize; 2]| {
+        let cloud = results::cloud(cx.state, source).ready()?.finger(finger)?;
+        cloud.points.get(cloud.at_pixel(x, y)?).copied()
+    };
+    let pointed = cx.state.selection.hover.and_then(|h| at(h.finger, h.at_px.map(|v| v.round().max(0.0) as usize)));
+    scene.clouds.extend(pointed.map(|point| one_point("pointer", point, cx.p.strong, 9.0)));
+    let picked = cx.state.workbench.picked.filter(|picked| picked.source == source);
+    let picked = picked.and_then(|picked| at(picked.finger, picked.pixel.map(usize::from)));
+    scene.clouds.extend(picked.map(|point| one_point("picked", point, cx.p.accent, 11.0)));
     meshes(cx, memory, source, &mut scene);
     steps::add(cx, memory, source, &mut scene);
     if cx.state.settings.scene.shows(SceneLayer::Guides) {
-        guides(cx, &mut scene);
+        let (ground, ink) = (rgb(cx.p.canvas), rgb(cx.p.weak));
+        scene.floor = Some(items::floor(ground, ink));
+        scene.lines.extend(items::guides(ground, ink, u64::from(*cx.p == theme::DARK)));
     }
     scene
-}
-
-/// The planes that cut a view open.
-pub(super) fn cut(cx: &Cx<'_>, memory: &Memory, source: ImprintSource) -> Vec<Plane> {
-    let mut planes = Vec::new();
-    let window = memory.clouds[source as usize].as_ref().and_then(|cloud| cloud.window);
-    if let Some([lo, hi]) = window.filter(|_| cx.state.settings.scene.only_window) {
-        for axis in [DVec3::Y, DVec3::Z] {
-            planes.extend([Plane::through(lo, axis), Plane::through(hi, -axis)]);
-        }
-    }
-    planes
 }
 
 /// The contact points of one finger, in one color.
 fn contact(finger: &str, revision: u64, points: &Arc<[DVec3]>, color: Color32) -> CloudItem {
     const DIAMETER_M: f32 = 0.000_35;
-    items::contact(finger, (revision, points.clone()), rgb(color), (PointSize::Meters(DIAMETER_M), 1.0))
+    items::contact(finger, (revision, points.clone()), rgb(color), PointSize::Meters(DIAMETER_M))
 }
 
 /// The contact points of both fingers, and those of the other side where both are shown in one view.
@@ -206,28 +180,6 @@ fn clouds(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, scene: &mut Scene
     }
 }
 
-/// The membranes as surfaces.
-fn surfaces(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, scene: &mut SceneData) {
-    const OPACITY: f32 = 0.4;
-    let Some(held) = &memory.surfaces[source as usize] else { return };
-    let color = rgb(color(cx, source, SceneLayer::Membrane));
-    for (finger, mesh) in held.fingers.entries() {
-        let finger = cx.state.finger_name(finger);
-        scene.meshes.push(items::membrane(&finger, (held.revision, mesh.clone()), color, OPACITY));
-    }
-}
-
-/// The point that was clicked.
-fn picked(cx: &Cx<'_>, source: ImprintSource, scene: &mut SceneData) {
-    let point = cx.state.workbench.picked.filter(|picked| picked.source == source).and_then(|picked| {
-        let cloud = results::cloud(cx.state, source).ready()?.finger(picked.finger)?;
-        cloud.points.get(cloud.at_pixel(picked.pixel[0].into(), picked.pixel[1].into())?).copied()
-    });
-    if let Some(point) = point {
-        scene.clouds.push(one_point("picked", point, cx.p.accent, 11.0));
-    }
-}
-
 /// A cloud of a single point, as large on the screen at any distance.
 fn one_point(name: &str, point: DVec3, color: Color32, px: f32) -> CloudItem {
     let bits = point.to_array().map(f64::to_bits);
@@ -237,19 +189,6 @@ fn one_point(name: &str, point: DVec3, color: Color32, px: f32) -> CloudItem {
         points: [point].into(),
         colors: PointColors::One,
         style: CloudStyle { color: rgb(color), size: PointSize::Px(px), ..CloudStyle::default() },
-    }
-}
-
-/// The pixel under the pointer, as a point of its own: it must not drown among the others.
-fn pointed(cx: &Cx<'_>, source: ImprintSource, scene: &mut SceneData) {
-    let state = cx.state;
-    let pointed = state.selection.hover.and_then(|h| {
-        let cloud = results::cloud(state, source).ready()?.finger(h.finger)?;
-        let (x, y) = (h.at_px[0].round().max(0.0) as usize, h.at_px[1].round().max(0.0) as usize);
-        cloud.points.get(cloud.at_pixel(x, y)?).copied()
-    });
-    if let Some(point) = pointed {
-        scene.clouds.push(one_point("pointer", point, cx.p.strong, 9.0));
     }
 }
 
@@ -306,31 +245,11 @@ fn meshes(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, scene: &mut Scene
             item.style = MeshStyle {
                 look: if through { Look::XRay } else { Look::Solid },
                 opacity: if through { 0.6 } else { 1.0 },
-                edges: Some(model_edges(cx, color)),
+                edges: Some(items::model_edges(rgb(color), rgb(cx.p.canvas))),
                 ..item.style
             };
             layers::paint_model(memory, source, world_from_mesh, &mut item);
         }
         scene.meshes.push(item);
     }
-}
-
-/// The edges of a shaded model of a color.
-fn model_edges(cx: &Cx<'_>, color: Color32) -> EdgeStyle {
-    items::model_edges(rgb(color), rgb(cx.p.canvas))
-}
-
-/// Floor, grid and axes.
-fn guides(cx: &Cx<'_>, scene: &mut SceneData) {
-    let (ground, ink) = (rgb(cx.p.canvas), rgb(cx.p.weak));
-    scene.floor = Some(items::floor(ground, ink));
-    scene.lines.extend(items::guides(ground, ink, u64::from(*cx.p == theme::DARK)));
-}
-
-/// Length of the drawn axes, meters.
-pub(super) const AXIS: f64 = items::AXIS_M;
-
-/// A corner of the floor grid.
-pub(super) fn axes_origin() -> DVec3 {
-    items::axes_origin()
 }

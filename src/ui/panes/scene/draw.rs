@@ -2,7 +2,7 @@
 
 use eframe::egui::{FontId, Ui, vec2};
 
-use super::{Memory, build, nearest};
+use super::{Memory, nearest};
 use crate::app::command::LabelsCommand;
 use crate::app::keys::ImprintSource;
 use crate::app::labels;
@@ -39,7 +39,7 @@ pub(super) fn show(
     }
     let camera = memory.views[source as usize].camera;
     let layers = state.settings.mask.layers;
-    let sight = camera.sight(output.size, layers, &build::cut(cx, memory, source));
+    let sight = camera.sight(output.size, layers);
     let drawn = state.document.stroke.as_ref().filter(|_| memory.drawing == Some(source));
     let drawn = drawn.and_then(|stroke| stroke.drawing.sight.as_deref().map(|sight| (stroke, sight)));
     if drawn.is_some_and(|(_, before)| before.clip_from_grasp != sight.clip_from_grasp) {

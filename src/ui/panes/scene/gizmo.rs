@@ -215,13 +215,13 @@ fn paint(cx: &Cx<'_>, ui: &Ui, output: &SceneOutput, placed: &Placed, active: Op
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gpu::view::Preset;
+    use touch2touch_core::frames::CameraPreset;
 
     const SIZE: [u32; 2] = [600, 400];
 
     fn side_view() -> Camera {
         let mut camera = Camera::default();
-        camera.look_from(Preset::Right);
+        camera.look_from(CameraPreset::Right);
         camera
     }
 
@@ -247,7 +247,7 @@ mod tests {
         let to = dragged(&camera, SIZE, from, Handle::Ring, px(0.3), px(0.9));
         assert!((to.theta_rad - 0.6).abs() < 1e-9 && (to.y_m, to.z_m) == (from.y_m, from.z_m), "{to:?}");
         let mut front = Camera::default();
-        front.look_from(Preset::Front);
+        front.look_from(CameraPreset::Front);
         for handle in [Handle::Disc, Handle::Ring] {
             let to = dragged(&front, SIZE, from, handle, DVec2::new(300.0, 200.0), DVec2::new(340.0, 250.0));
             assert!(to.is_finite() && origin(to).length() < 0.1, "{handle:?} {to:?}");

@@ -10,7 +10,7 @@ use crate::app::workbench::{ManualTry, SceneTool};
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{SMALL, caption};
 use touch2touch_core::frames::PlanarPose;
-use touch2touch_core::manual::{ManualCost, PoseDifference};
+use touch2touch_core::manual::PoseDifference;
 use touch2touch_core::units;
 
 /// The pose that a hand holds on a side, or would hold.
@@ -56,7 +56,9 @@ pub(super) fn strip(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: R
                 for (action, text) in
                     [(Action::IcpFromHere, icp), (Action::Accept, "Accept"), (Action::RevertHand, "Revert")]
                 {
-                    small_button(cx, ui, action, text, source);
+                    let button = Button::selectable(false, RichText::new(text).size(SMALL)).frame_when_inactive(true);
+                    let name = format!("{}, {}", action.name(), source.name().to_lowercase());
+                    cx.acting(ui, action, button.min_size(vec2(0.0, 20.0)), name);
                 }
             });
             let keys = "[[nudge_left]], [[nudge_right]], [[nudge_up]], [[nudge_down]] 0.1 mm · [[turn_left]], [[turn_right]] 0.5° · \
@@ -64,12 +66,6 @@ pub(super) fn strip(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: R
             ui.label(caption(with_keys(keys), cx.p));
         });
     });
-}
-
-fn small_button(cx: &mut Cx<'_>, ui: &mut Ui, action: Action, text: &str, source: ImprintSource) {
-    let button = Button::selectable(false, RichText::new(text).size(SMALL)).frame_when_inactive(true);
-    let name = format!("{}, {}", action.name(), source.name().to_lowercase());
-    cx.acting(ui, action, button.min_size(vec2(0.0, 20.0)), name);
 }
 
 /// The three numbers of a pose.
@@ -85,21 +81,17 @@ fn cost_text(cx: &Cx<'_>, hand: Option<&ManualTry>) -> (String, Color32) {
         return ("Move the tool with the arrow keys or its handles".into(), cx.p.weak);
     };
     let text = match (hand.cost, hand.began_cost) {
-        (Some(now), Some(before)) => costs(now, before),
+        (Some(now), Some(before)) => format!(
+            "outline {:.2} (was {:.2}) mm · {:.0} % inliers · surface {:.2} mm",
+            units::mm(now.outline_rms_m),
+            units::mm(before.outline_rms_m),
+            now.inlier_share * 100.0,
+            units::mm(now.surface_rms_m)
+        ),
         _ => "Fit: waiting for the contact points".into(),
     };
     let better = hand.cost.zip(hand.began_cost).is_some_and(|(a, b)| a.cost_m2 <= b.cost_m2);
     (text, if better { cx.p.good } else { cx.p.caution })
-}
-
-fn costs(now: ManualCost, before: ManualCost) -> String {
-    format!(
-        "outline {:.2} (was {:.2}) mm · {:.0} % inliers · surface {:.2} mm",
-        units::mm(now.outline_rms_m),
-        units::mm(before.outline_rms_m),
-        now.inlier_share * 100.0,
-        units::mm(now.surface_rms_m)
-    )
 }
 
 /// Difference of a pose from the truth.

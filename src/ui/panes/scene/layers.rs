@@ -88,9 +88,7 @@ fn update_distances(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource) {
     let (key, reach) = ((key, Layer::Distance), cx.state.settings.scene.distance_m);
     let range = Range { lo: -reach, hi: reach };
     if let Some(held) = held.as_mut().filter(|h| h.key == key) {
-        if held.range != range {
-            held.range = range;
-        }
+        held.range = range;
         return;
     }
     let painted = &deviation.surface;

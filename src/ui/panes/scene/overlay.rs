@@ -3,15 +3,14 @@
 use eframe::egui::{self, Align2, Color32, FontId, Rect, Stroke, Ui, pos2};
 use glam::DVec3;
 
-use super::Memory;
-use super::build::{AXIS, axes_origin};
-use super::legend;
+use super::{Memory, legend};
 use crate::app::keys::ImprintSource;
 use crate::app::results;
 use crate::app::settings::SceneLayer;
 use crate::app::state::Absent;
 use crate::gpu::guides;
 use crate::gpu::view::Camera;
+use crate::spatial::items;
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::scene_view::SceneOutput;
 use crate::ui::parts::theme::{Palette, grade_color};
@@ -106,7 +105,7 @@ fn axes_and_scale(p: &Palette, painter: &egui::Painter, camera: &Camera, output:
         (DVec3::Y, "y", guides::AXIS_COLORS[1]),
         (DVec3::Z, "z", guides::AXIS_COLORS[2]),
     ] {
-        if let Some(tip) = output.on_screen(camera, axes_origin() + axis * (AXIS * 1.25)) {
+        if let Some(tip) = output.on_screen(camera, items::axes_origin() + axis * (items::AXIS_M * 1.25)) {
             let color = Color32::from_rgb(color[0], color[1], color[2]);
             painter.text(tip, Align2::CENTER_CENTER, name, FontId::proportional(11.0), color);
         }

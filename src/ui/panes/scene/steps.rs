@@ -6,8 +6,8 @@ use eframe::egui::Color32;
 use glam::{DAffine3, DVec3};
 
 use super::Memory;
-use crate::app::inspect::Inspected;
-use crate::app::keys::{ImprintSource, Inspection};
+use crate::app::inspect::{Inspected, Inspection};
+use crate::app::keys::ImprintSource;
 use crate::app::results;
 use crate::app::workbench::Layer;
 use crate::gpu::lines::{LinesItem, LinesStyle, Segment};

@@ -99,7 +99,6 @@ fn shown(cx: &mut Cx<'_>, ui: &mut Ui) {
             }
         }
         ui.separator();
-        cx.menu_row(ui, Action::WindowOnly, cx.state.settings.scene.only_window);
         cx.menu_row(ui, Action::BothClouds, cx.state.workbench.both_clouds);
     });
 }

@@ -154,16 +154,13 @@ fn paint_histogram(painter: &egui::Painter, histogram: &Histogram, range: Range,
 
 /// A number that can be typed or dragged. Returns whether it changed.
 fn end(ui: &mut Ui, value: &mut f32, label: &str) -> bool {
-    ui.scope(|ui| end_inner(ui, value, label)).inner
-}
-
-fn end_inner(ui: &mut Ui, value: &mut f32, label: &str) -> bool {
-    ui.style_mut().override_font_id = Some(FontId::proportional(12.0));
-    ui.spacing_mut().button_padding.x = 2.0;
     let drag = egui::DragValue::new(value).speed(0.05).fixed_decimals(2).range(-100.0..=100.0);
-    let response = ui.add_sized([END, 18.0], drag);
-    let response = response.accessible_name(label);
-    response.on_hover_text(format!("{label}, mm: drag, or click and type")).changed()
+    let response = ui.scope(|ui| {
+        ui.style_mut().override_font_id = Some(FontId::proportional(12.0));
+        ui.spacing_mut().button_padding.x = 2.0;
+        ui.add_sized([END, 18.0], drag).accessible_name(label)
+    });
+    response.inner.on_hover_text(format!("{label}, mm: drag, or click and type")).changed()
 }
 
 /// Fills `bar` from left to right with the colors of 0 to 1, exact at `steps` + 1 places.

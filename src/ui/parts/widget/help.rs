@@ -44,7 +44,7 @@ pub(crate) const SCENE: &[(&str, &str)] = &[
     ("Click a point", "read it"),
     ("[[pose_tool]]", "pose tool: keys or handles; [[accept]] accepts, [[cancel_jobs]] reverts"),
     ("[[distances]], [[next_layer]]", "distance to the CAD in mm; other colorings"),
-    ("[[window_only]], [[parallel]]", "GelSlim window only, parallel projection"),
+    ("[[parallel]]", "parallel projection"),
     ("Click on the colored dots", "legend: show or hide"),
 ];
 

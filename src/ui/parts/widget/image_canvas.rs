@@ -5,18 +5,14 @@ use eframe::egui::{
     Vec2, WidgetInfo, pos2, vec2,
 };
 
-/// Part of an image that is seen. Shared by all canvases of a group, whatever their sizes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct ViewTransform {
-    /// The point of the image in the middle of the pane, as a share of its width and height.
-    pub center: [f32; 2],
-    /// Magnification; 1 fits the image to the pane.
-    pub zoom: f32,
-}
-
-impl Default for ViewTransform {
-    fn default() -> Self {
-        Self { center: [0.5, 0.5], zoom: 1.0 }
+with_defaults! {
+    /// Part of an image that is seen. Shared by all canvases of a group, whatever their sizes.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub(crate) struct ViewTransform {
+        /// The point of the image in the middle of the pane, as a share of its width and height.
+        pub center: [f32; 2] = [0.5, 0.5],
+        /// Magnification; 1 fits the image to the pane.
+        pub zoom: f32 = 1.0,
     }
 }
 
