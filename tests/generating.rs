@@ -2,7 +2,7 @@
 //! the disk, and inputs that make no sense (row E22 of the list of numerical failures, from image to picture).
 
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use rayon::prelude::*;
 use strum::IntoEnumIterator as _;
@@ -10,30 +10,15 @@ use touch2touch::app::services::Services;
 use touch2touch_core::diffusion::{GenerateConfig, Progress, Sampler, Spacing};
 use touch2touch_core::grid::{Grid, RgbGrid};
 use touch2touch_core::postprocess::RawPrediction;
-use touch2touch_pipeline::infer::bundle::{Bundle, MANIFEST};
+use touch2touch_pipeline::infer::bundle::Bundle;
 use touch2touch_pipeline::infer::engine::EngineChoice;
 use touch2touch_pipeline::infer::generator::{GenerateError, Generator, Item, Observer};
 use touch2touch_pipeline::job::JobCx;
 use touch2touch_pipeline::steps::bundles::{self, BundleInfo};
 use touch2touch_pipeline::steps::models::{GenerateInput, Models};
 
-fn fixture() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles/generator")
-}
-
-/// The tiny bundle with another manifest.
-fn with_manifest(change: impl FnOnce(&mut serde_json::Value)) -> tempfile::TempDir {
-    let dir = tempfile::tempdir().unwrap();
-    for entry in std::fs::read_dir(fixture()).unwrap() {
-        let path = entry.unwrap().path();
-        std::fs::copy(&path, dir.path().join(path.file_name().unwrap())).unwrap();
-    }
-    let path = dir.path().join(MANIFEST);
-    let mut manifest = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
-    change(&mut manifest);
-    std::fs::write(path, manifest.to_string()).unwrap();
-    dir
-}
+use crate::models::running::{config, go_on, largest_difference};
+use crate::support::{tiny, tiny_with};
 
 fn open(dir: &Path) -> Generator {
     Generator::open(&Bundle::open(dir).unwrap(), EngineChoice::Rten).unwrap()
@@ -46,19 +31,6 @@ fn image(phase: f32) -> RgbGrid {
     })
 }
 
-fn go_on(_: Progress) -> ControlFlow<()> {
-    ControlFlow::Continue(())
-}
-
-fn config() -> GenerateConfig {
-    GenerateConfig { steps: 6, ..Default::default() }
-}
-
-fn largest_difference(a: &RawPrediction, b: &RawPrediction) -> f32 {
-    let pairs = a.channels.iter().zip(&b.channels).flat_map(|(a, b)| a.as_slice().iter().zip(b.as_slice()));
-    pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
-}
-
 /// How often each graph ran: condition encoder, denoiser, decoder.
 fn runs(generator: &mut Generator) -> [u64; 3] {
     generator.graphs().map(|graph| graph.runs())
@@ -66,7 +38,7 @@ fn runs(generator: &mut Generator) -> [u64; 3] {
 
 #[test]
 fn each_image_is_encoded_once_however_many_seeds_it_has() {
-    let mut generator = open(&fixture());
+    let mut generator = open(&tiny("generator"));
     let (a, b) = (image(0.0), image(1.0));
     let items: Vec<Item> = [1, 2, 3].iter().flat_map(|&seed| [0, 1].map(|image| Item { image, seed })).collect();
     let made = generator.run(&[&a, &b], &items, &config(), &mut go_on).unwrap();
@@ -109,7 +81,7 @@ impl Observer for Looker {
 
 #[test]
 fn previews_show_what_is_coming_and_change_nothing() {
-    let mut generator = open(&fixture());
+    let mut generator = open(&tiny("generator"));
     let items = [0, 1].map(|image| Item { image, seed: 7 });
     for sampler in Sampler::iter() {
         let config = GenerateConfig { sampler, ..config() };
@@ -135,14 +107,17 @@ fn previews_show_what_is_coming_and_change_nothing() {
 
 #[test]
 fn guidance_is_what_its_formula_says_and_only_where_declared() {
-    let refused = open(&fixture()).generate(&image(0.0), &GenerateConfig { guidance: 2.0, ..config() }, &mut go_on);
+    let refused =
+        open(&tiny("generator")).generate(&image(0.0), &GenerateConfig { guidance: 2.0, ..config() }, &mut go_on);
     let text = refused.unwrap_err().to_string();
     assert!(text.contains("was not trained for guidance") && text.contains('2'), "{text}");
 
     let blank = Grid::filled(16, 16, [0.0; 3]);
-    let plain = open(&fixture()).generate(&image(0.0), &config(), &mut go_on).unwrap();
-    let unguided = open(&fixture()).generate(&blank, &config(), &mut go_on).unwrap();
-    let dir = with_manifest(|m| m["guidance"] = serde_json::json!({"unconditional": "zero_difference", "scale": 3.0}));
+    let plain = open(&tiny("generator")).generate(&image(0.0), &config(), &mut go_on).unwrap();
+    let unguided = open(&tiny("generator")).generate(&blank, &config(), &mut go_on).unwrap();
+    let dir = tiny_with("generator", |m| {
+        m["guidance"] = serde_json::json!({"unconditional": "zero_difference", "scale": 3.0})
+    });
     let mut generator = open(dir.path());
     assert_eq!(generator.spec().defaults.guidance, 3.0, "the declared scale is the default");
     let mut guided = |guidance| generator.generate(&image(0.0), &GenerateConfig { guidance, ..config() }, &mut go_on);
@@ -154,7 +129,9 @@ fn guidance_is_what_its_formula_says_and_only_where_declared() {
     assert!(matches!(guided(f64::NAN), Err(GenerateError::Diffusion(_))));
     // 6 steps with a scale of 1, and 6 for each half with 0 and with 3.
     assert_eq!(runs(&mut generator)[1], 30);
-    let other = with_manifest(|m| m["guidance"] = serde_json::json!({"unconditional": "zero_condition", "scale": 1.0}));
+    let other = tiny_with("generator", |m| {
+        m["guidance"] = serde_json::json!({"unconditional": "zero_condition", "scale": 1.0})
+    });
     let config = GenerateConfig { guidance: 3.0, ..config() };
     let zeros = open(other.path()).generate(&image(0.0), &config, &mut go_on).unwrap();
     let difference = generator.generate(&image(0.0), &config, &mut go_on).unwrap();
@@ -164,7 +141,7 @@ fn guidance_is_what_its_formula_says_and_only_where_declared() {
         (serde_json::json!({"unconditional": "noise", "scale": 2}), "guidance: unknown variant"),
         (serde_json::json!({"scale": 2}), "guidance: missing field"),
     ] {
-        let dir = with_manifest(|m| m["guidance"] = guidance);
+        let dir = tiny_with("generator", |m| m["guidance"] = guidance);
         let text = Bundle::open(dir.path()).unwrap_err().to_string();
         assert!(text.contains(problem), "{text}");
     }
@@ -173,7 +150,7 @@ fn guidance_is_what_its_formula_says_and_only_where_declared() {
 /// Row E22: alpha bar of 0 and 1, few and many steps, every eta; and images that no camera takes.
 #[test]
 fn e22_every_input_gives_finite_pictures_or_a_clear_error() {
-    let mut generator = open(&fixture());
+    let mut generator = open(&tiny("generator"));
     let huge = |v: f32| Grid::filled(43, 32, [v, -v, v]);
     let images = [huge(0.0), huge(255.0), huge(-255.0), huge(1e-30), huge(1e30), huge(f32::MAX), image(0.0)];
     for image in &images {
@@ -210,7 +187,7 @@ fn e22_every_input_gives_finite_pictures_or_a_clear_error() {
 }
 
 fn bundle() -> BundleInfo {
-    bundles::find(&[fixture()])
+    bundles::find(&[tiny("generator")])
         .bundles
         .into_iter()
         .find(|b| b.name == "Tiny generator of the tests")
@@ -272,10 +249,7 @@ fn many_threads_of_a_pool_predict_and_mask_with_one_model() {
     let (done, told) = std::sync::mpsc::channel();
     std::thread::spawn(move || {
         let models = Models::new(None);
-        let bundle = |name| {
-            let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles").join(name);
-            BundleInfo::of(&Bundle::open(&folder).unwrap())
-        };
+        let bundle = |name| BundleInfo::of(&Bundle::open(&tiny(name)).unwrap());
         let (generator, mask) = (bundle("generator"), bundle("mask"));
         let difference = image(0.0);
         let predicted = |seed| {

@@ -29,4 +29,3 @@ mod support;
 mod training;
 mod ui;
 mod unsound;
-mod words;

@@ -10,7 +10,7 @@ use touch2touch_core::rig::Rig;
 use touch2touch_pipeline::io::dataset::{Dataset, OpenError, RIG_JSON};
 use touch2touch_pipeline::io::images;
 
-use crate::support::run;
+use crate::support::{run, tiny};
 
 /// A gripper of two fingers, each with a color and a depth sensor.
 fn sound() -> Value {
@@ -223,7 +223,7 @@ fn names_from_files_are_shown_and_never_obeyed() {
         text
     };
     let mut all = String::new();
-    let bundle = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles/digit_to_bubble");
+    let bundle = tiny("digit_to_bubble");
     for args in [
         &["doctor", place][..],
         &["doctor", place, "--json"],

@@ -7,7 +7,6 @@ mod layout;
 mod look;
 mod rig;
 
-mod adapt;
 mod calm;
 mod chain;
 mod compare;
