@@ -189,7 +189,7 @@ fn a_run_that_is_stopped_goes_on_to_the_same_last_bit() {
         },
         pairs: (0..4).map(PairId).collect(),
         folds: 2,
-        tuning: Some(Tuning::Steps(1)),
+        tuning: Some(Tuning::Steps(2)),
         unfinished,
         out: None,
         force: false,
@@ -197,14 +197,14 @@ fn a_run_that_is_stopped_goes_on_to_the_same_last_bit() {
     };
     let models = Models::new(None);
     let straight = adapt(&dataset, &setup(None), &models, &JobCx::unwatched()).unwrap();
-    assert_eq!((straight.steps, straight.curves.len()), (1, 5), "{:?}", straight.curves);
-    assert!(straight.warnings.iter().any(|w| w.contains("tuning steps are few")), "{:?}", straight.warnings);
-    // Stopped after the parts, before the run on all; the tuner's own tests stop it between steps.
+    assert_eq!((straight.steps, straight.curves.len()), (2, 5), "{:?}", straight.curves);
+    assert!(straight.warnings.iter().any(|w| w.contains("2 tuning steps are few")), "{:?}", straight.warnings);
+    // Stopped in the run on all, between its steps.
     let kept = dir.path().join("unfinished");
     let cancel = Cancel::default();
     let told = cancel.clone();
     let watch = move |progress: Progress| {
-        if progress.total == 3 && progress.done >= 2 {
+        if progress.total == 6 && progress.done >= 5 {
             told.cancel();
         }
     };
@@ -213,13 +213,13 @@ fn a_run_that_is_stopped_goes_on_to_the_same_last_bit() {
     let seen = Arc::new(Mutex::new(Vec::new()));
     let sink = seen.clone();
     let watch = move |progress: Progress| {
-        if progress.total == 3 {
+        if progress.total == 6 {
             sink.lock().unwrap().push(progress.done);
         }
     };
     let again = JobCx::new(Cancel::default(), Arc::new(watch));
     let resumed = adapt(&dataset, &setup(Some(kept.clone())), &models, &again).unwrap();
-    assert_eq!(*seen.lock().unwrap(), [3], "only the last step was made");
+    assert_eq!(*seen.lock().unwrap(), [6], "only the last step was made");
     assert_eq!((&resumed.curves, &resumed.held_back), (&straight.curves, &straight.held_back));
     assert_eq!(std::fs::read_dir(&kept).unwrap().count(), 0, "nothing is left of a finished run");
 }

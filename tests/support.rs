@@ -101,9 +101,12 @@ pub(crate) fn write_grasps(root: &Path, layout: Layout, tools: &[ToolSpec], gras
     write_tools(root, &meshes).unwrap();
 }
 
-/// The GelSlim and the bubble file of a simulated grasp.
-fn grasp_files(tool: &ToolSpec, index: u64) -> Arc<[Vec<u8>; 2]> {
-    static MADE: Mutex<BTreeMap<(String, u64), Arc<[Vec<u8>; 2]>>> = Mutex::new(BTreeMap::new());
+/// The contents of a GelSlim and of a bubble file.
+type PairFiles = Arc<[Vec<u8>; 2]>;
+
+/// The files of a simulated grasp.
+fn grasp_files(tool: &ToolSpec, index: u64) -> PairFiles {
+    static MADE: Mutex<BTreeMap<(String, u64), PairFiles>> = Mutex::new(BTreeMap::new());
     let mut made = MADE.lock().unwrap_or_else(PoisonError::into_inner);
     let files = made.entry((tool.name.clone(), index)).or_insert_with(|| {
         let folder = tempfile::tempdir().unwrap();

@@ -32,7 +32,7 @@ fn a_pane_that_has_nothing_to_show_leaves_its_room() {
 /// Nothing below the tools moves when one is chosen, a mask is changed or a proposal is shown.
 #[test]
 fn nothing_in_the_mask_pane_moves_under_the_pointer() {
-    let Some(mut rig) = Rig::new(SIZE, 2) else { return };
+    let Some(mut rig) = Rig::new(SIZE, 1) else { return };
     rig.send(prefer(|s| s.workspace = Workspace::Label));
     let place = |rig: &Rig| ["Done and next", "Mask source", "Note"].map(|name| rig.harness.get_by_label(name).rect());
     let before = place(&rig);

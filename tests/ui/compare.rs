@@ -32,7 +32,7 @@ fn set(rig: &mut Rig, a: &str, b: &str, mode: CompareMode) {
 
 #[test]
 fn any_two_imprints_are_compared_where_somebody_looks() {
-    let Some(mut rig) = Rig::new([1280.0, 800.0], 2) else { return };
+    let Some(mut rig) = Rig::new([1280.0, 800.0], 1) else { return };
     rig.send(PredictCommand::Generate);
     // Behind a pane that fills the window nothing is made of what is wished there.
     rig.fill("Predicted imprint");

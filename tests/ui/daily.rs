@@ -22,9 +22,9 @@ fn quiet(rig: &mut Rig) {
 
 #[test]
 fn a_restart_brings_back_pair_finger_camera_and_the_large_pane() {
-    let Some(mut rig) = Rig::new(SIZE, 3) else { return };
+    let Some(mut rig) = Rig::new(SIZE, 1) else { return };
     rig.send(prefer(|s| s.workspace = Workspace::Align));
-    rig.send(LibraryCommand::Step(4));
+    rig.send(LibraryCommand::Step(1));
     rig.send(ViewCommand::SelectFinger(lab::LEFT));
     rig.send(ViewCommand::ShowBothFingers(false));
     quiet(&mut rig);

@@ -95,7 +95,7 @@ fn real_pairs_are_fitted_from_the_panel_and_the_fit_is_used_at_once() {
 fn data_that_are_read_wrongly_are_read_rightly_by_a_click() {
     let folder = tempfile::tempdir().unwrap();
     let data = folder.path().join("grasps");
-    write_dataset(&data, 2);
+    write_dataset(&data, 1);
     write_read_as(&data, &[ReadAs::NegateTheta]).unwrap();
     let Some(mut rig) = Rig::greeting(SIZE, Place::Path(data.clone()), true) else { return };
     rig.click("Read as stored");

@@ -45,7 +45,7 @@ impl Rig {
 
 #[test]
 fn cloud_pose_and_mesh_are_exported_and_the_command_is_copied_from_the_menu_of_a_scene() {
-    let Some(mut rig) = Rig::new(SIZE, 3) else { return };
+    let Some(mut rig) = Rig::new(SIZE, 1) else { return };
     rig.predicted();
     rig.send(prefer(|s| s.workspace = Workspace::Align));
     let folder = rig.data.join("taken");

@@ -33,7 +33,7 @@ impl Rig {
 
     /// The Align workspace on a grasp with its true contact.
     fn align() -> Option<Self> {
-        let mut rig = Self::new(SIZE, 2)?;
+        let mut rig = Self::new(SIZE, 1)?;
         rig.send(prefer(|s| s.mask.choice.source = MaskSource::Truth));
         assert!(rig.state().results.runs.is_empty(), "nobody looks yet");
         rig.send(prefer(|s| s.workspace = Workspace::Align));

@@ -58,7 +58,7 @@ fn files(folder: &Path, out: &mut BTreeMap<PathBuf, u64>) {
 
 #[test]
 fn browse_generate_shift_paint_undo() {
-    let Some(mut rig) = Rig::new(SIZE, 3) else { return };
+    let Some(mut rig) = Rig::new(SIZE, 2) else { return };
     let start = rig.state().selection.pair;
 
     // Step to the next pair, and back.
@@ -144,7 +144,7 @@ fn browse_generate_shift_paint_undo() {
 
 #[test]
 fn at_rest_nothing_is_drawn_uploaded_or_written() {
-    let Some(mut rig) = Rig::new(SIZE, 2) else { return };
+    let Some(mut rig) = Rig::new(SIZE, 1) else { return };
     rig.send(PredictCommand::Generate);
     // A note on the screen goes by itself: the one thing that is waited for.
     rig.send(TasksCommand::LogSeen(u64::MAX));
@@ -165,7 +165,7 @@ fn at_rest_nothing_is_drawn_uploaded_or_written() {
 
 #[test]
 fn a_wrong_path_is_said_where_it_was_typed_and_what_is_open_stays() {
-    let Some(mut rig) = Rig::new(SIZE, 2) else { return };
+    let Some(mut rig) = Rig::new(SIZE, 1) else { return };
     let pairs = rig.state().library.pairs().len();
     let said = rig.state().log.unseen().count();
     rig.key(Modifiers::CTRL, Key::O);

@@ -351,7 +351,7 @@ fn undo_and_redo_go_on_where_they_were_after_a_restart() {
 
 #[test]
 fn masks_are_exported_as_pictures_and_imported_again_by_clicks() {
-    let Some(mut rig) = Rig::new(SIZE, 2) else { return };
+    let Some(mut rig) = Rig::new(SIZE, 1) else { return };
     rig.send(prefer(|s| s.workspace = Workspace::Label));
     with_nothing_automatic(&mut rig);
     rig.send(LabelsCommand::AdoptAutomatic);

@@ -9,7 +9,7 @@ const SIZE: [f32; 2] = [1280.0, 800.0];
 
 #[test]
 fn a_damaged_layout_is_replaced_and_reset_works() {
-    let Some(mut rig) = Rig::new(SIZE, 2) else { return };
+    let Some(mut rig) = Rig::new(SIZE, 1) else { return };
     assert!(rig.harness.state().layout_is_valid());
     rig.send(SettingsCommand::SetLayout(Workspace::Inspect, "{\"not\": \"a layout\"}".into()));
     rig.restart(SIZE);

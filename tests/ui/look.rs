@@ -22,7 +22,7 @@ const STRAY: PlanarPose = PlanarPose { theta_rad: -0.7, y_m: 0.008, z_m: 0.0 };
 /// Every workspace draws something in both themes and sizes.
 #[test]
 fn every_workspace_draws_in_both_themes() {
-    let Some(mut rig) = Rig::new([1280.0, 800.0], 3) else { return };
+    let Some(mut rig) = Rig::new([1280.0, 800.0], 1) else { return };
     rig.send(PredictCommand::Generate);
     for theme in [Theme::Dark, Theme::Light] {
         rig.send(prefer(move |s| s.theme = theme));

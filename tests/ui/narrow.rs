@@ -60,7 +60,7 @@ fn beyond(rig: &Rig) -> Vec<String> {
 
 #[test]
 fn no_control_is_cut_off_in_a_window_of_1024_by_700() {
-    let Some(mut rig) = Rig::new(SIZE, 2) else { return };
+    let Some(mut rig) = Rig::new(SIZE, 1) else { return };
     rig.send(PredictCommand::Generate);
     let mut found = Vec::new();
     for workspace in Workspace::iter() {

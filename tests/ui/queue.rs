@@ -19,7 +19,7 @@ fn desk(rig: &mut Rig) {
 
 #[test]
 fn a_note_is_typed_without_a_key_firing_and_is_found_again() {
-    let Some(mut rig) = Rig::new(SIZE, 2) else { return };
+    let Some(mut rig) = Rig::new(SIZE, 1) else { return };
     desk(&mut rig);
     let name = rig.state().pair_name().to_owned();
     let field = rig.harness.get_by_label("Note");

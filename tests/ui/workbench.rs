@@ -60,7 +60,7 @@ impl Rig {
 
     /// The studio on the Align workspace with true masks, the pointer in the measured view, seen from the right.
     pub(super) fn aligned() -> Option<Self> {
-        Self::new(SIZE, 2).map(Self::in_align)
+        Self::new(SIZE, 1).map(Self::in_align)
     }
 
     fn in_align(mut self) -> Self {
