@@ -1,7 +1,6 @@
 //! `adapt` as a user runs it: on simulated grasps, on pictures of a rig with known faults, and on the lab's real pairs.
 
 use std::path::{Path, PathBuf};
-use std::process::Output;
 use std::sync::{Arc, Mutex};
 
 use serde_json::Value;
@@ -19,16 +18,7 @@ use touch2touch_pipeline::steps::models::Models;
 use touch2touch_pipeline::steps::recipe::Recipe;
 
 use crate::cli_generate::full_size_bundle;
-use crate::support::{run, shared};
-
-fn json(output: &Output) -> Value {
-    let error = String::from_utf8_lossy(&output.stderr);
-    serde_json::from_slice(&output.stdout).unwrap_or_else(|err| panic!("{err}: {error}"))
-}
-
-fn said(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
+use crate::support::{error_text, json, run, shared, simulate};
 
 /// Pairs of pictures: a touch somewhere, seen by the lights of a GelSlim, and its imprint, moved and under a pattern.
 fn pictures(folder: &Path, count: usize) {
@@ -70,7 +60,11 @@ fn a_fit_is_scored_on_what_was_left_out_and_becomes_a_bundle_of_its_own() {
     assert!(tried["bundle"].is_null() && !Path::new(out).exists());
     // The tiny generator draws the same whatever it sees, which is said of its fit.
     let refused = adapt(&["--out", out]);
-    assert!(!refused.status.success() && said(&refused).contains("do not match their own"), "{}", said(&refused));
+    assert!(
+        !refused.status.success() && error_text(&refused).contains("do not match their own"),
+        "{}",
+        error_text(&refused)
+    );
     assert!(!Path::new(out).exists());
     let made = json(&adapt(&["--out", out, "--force"]));
     assert_eq!((&made["pairs"], &made["touches"], &made["bundle"]), (&12.into(), &12.into(), &out.into()));
@@ -99,15 +93,23 @@ fn a_fit_is_scored_on_what_was_left_out_and_becomes_a_bundle_of_its_own() {
     // The source is not overwritten, nor is a folder with something else in it.
     for (folder, why) in [(bundle, "stays as it is"), (set, "holds other files")] {
         let refused = adapt(&["--out", folder]);
-        assert!(!refused.status.success() && said(&refused).contains(why), "{}", said(&refused));
+        assert!(!refused.status.success() && error_text(&refused).contains(why), "{}", error_text(&refused));
     }
     assert_eq!(json(&adapt(&["--out", out, "--force"]))["bundle"], out, "a fit may be made again");
     let twice = run(&["adapt", set, "--bundle", out, "--runtime", "rten", "--json"], dir.path());
-    assert!(said(&twice).contains("was fitted already") && said(&twice).contains("made from"), "{}", said(&twice));
+    assert!(
+        error_text(&twice).contains("was fitted already") && error_text(&twice).contains("made from"),
+        "{}",
+        error_text(&twice)
+    );
     // A damaged fit is a damaged bundle.
     std::fs::write(Path::new(out).join("fit.npz"), b"no archive").unwrap();
     let broken = run(&["generate", set, "--out", set, "--bundle", out, "--runtime", "rten"], dir.path());
-    assert!(said(&broken).contains("fit.npz") && said(&broken).contains("SHA-256"), "{}", said(&broken));
+    assert!(
+        error_text(&broken).contains("fit.npz") && error_text(&broken).contains("SHA-256"),
+        "{}",
+        error_text(&broken)
+    );
 }
 
 #[test]
@@ -122,14 +124,14 @@ fn poor_pairs_are_left_out_or_pointed_at_in_plain_words() {
         run(&[&fixed[..], more].concat(), dir.path())
     };
     let few = adapt(&["--pairs", "01,02,03"]);
-    assert!(json(&few)["pairs"] == 3 && said(&few).contains("3 pairs are few"), "{}", said(&few));
+    assert!(json(&few)["pairs"] == 3 && error_text(&few).contains("3 pairs are few"), "{}", error_text(&few));
     let one = adapt(&["--pairs", "01"]);
-    assert!(json(&one)["closed_form"].is_null(), "nothing can be left out of one pair: {}", said(&one));
+    assert!(json(&one)["closed_form"].is_null(), "nothing can be left out of one pair: {}", error_text(&one));
     std::fs::write(set.join("07_bubble.png"), b"not a picture").unwrap();
     let found = json(&adapt(&[]));
     assert_eq!((found["left_out"][0]["name"].as_str(), &found["pairs"]), (Some("07"), &12.into()), "{found:#}");
     let none = adapt(&["--pairs", "nobody"]);
-    assert!(!none.status.success() && said(&none).contains("nobody"), "{}", said(&none));
+    assert!(!none.status.success() && error_text(&none).contains("nobody"), "{}", error_text(&none));
 }
 
 #[test]
@@ -138,12 +140,8 @@ fn measured_meters_are_fitted_too_and_other_data_are_warned_of() {
     let bundle = full_size_bundle(dir.path());
     let (set, out, pairs) = (dir.path().join("set"), dir.path().join("fitted"), dir.path().join("pairs"));
     pictures(&pairs, 2);
+    simulate(&set, "pattern_36,pattern_35", &["--grasps", "3", "--seed", "3"]);
     let [set, out, bundle, pairs] = [&set, &out, &bundle, &pairs].map(|p| p.to_str().unwrap());
-    let made = run(
-        &["simulate", "--out", set, "--tools", "pattern_36,pattern_35", "--grasps", "3", "--seed", "3"],
-        dir.path(),
-    );
-    assert!(made.status.success(), "{}", said(&made));
     let fixed = [
         "adapt",
         set,
@@ -172,7 +170,7 @@ fn measured_meters_are_fitted_too_and_other_data_are_warned_of() {
     let to = dir.path().join("pictures");
     let other =
         run(&["generate", pairs, "--out", to.to_str().unwrap(), "--bundle", out, "--runtime", "rten"], dir.path());
-    assert!(said(&other).contains("was fitted to 6 pairs"), "{}", said(&other));
+    assert!(error_text(&other).contains("was fitted to 6 pairs"), "{}", error_text(&other));
 }
 
 #[test]
@@ -201,19 +199,17 @@ fn a_run_that_is_stopped_goes_on_to_the_same_last_bit() {
     let straight = adapt(&dataset, &setup(None), &models, &JobCx::unwatched()).unwrap();
     assert_eq!((straight.steps, straight.curves.len()), (2, 5), "{:?}", straight.curves);
     assert!(straight.warnings.iter().any(|w| w.contains("2 tuning steps are few")), "{:?}", straight.warnings);
-    // Stopped in the first part and in the run on all.
+    // Stopped in the run on all, between its steps.
     let kept = dir.path().join("unfinished");
-    for stop_at in [1, 5] {
-        let cancel = Cancel::default();
-        let told = cancel.clone();
-        let watch = move |progress: Progress| {
-            if progress.total == 6 && progress.done >= stop_at {
-                told.cancel();
-            }
-        };
-        let stopped = adapt(&dataset, &setup(Some(kept.clone())), &models, &JobCx::new(cancel, Arc::new(watch)));
-        assert_eq!(stopped.unwrap_err().kind, TaskErrorKind::Cancelled);
-    }
+    let cancel = Cancel::default();
+    let told = cancel.clone();
+    let watch = move |progress: Progress| {
+        if progress.total == 6 && progress.done >= 5 {
+            told.cancel();
+        }
+    };
+    let stopped = adapt(&dataset, &setup(Some(kept.clone())), &models, &JobCx::new(cancel, Arc::new(watch)));
+    assert_eq!(stopped.unwrap_err().kind, TaskErrorKind::Cancelled);
     let seen = Arc::new(Mutex::new(Vec::new()));
     let sink = seen.clone();
     let watch = move |progress: Progress| {

@@ -1,7 +1,6 @@
 //! The studio and the command line are one program: what a button does, a verb does, and with the same numbers.
 
 mod edits;
-mod exchange;
 mod in_3d;
 mod proposals;
 mod python;
@@ -28,7 +27,7 @@ use touch2touch::app::library::Place;
 use touch2touch::app::runtime::Runtime;
 use touch2touch::app::services::Services;
 use touch2touch::app::settings::prefer;
-use touch2touch::app::settings::{CompareChoice, CompareMode, MaskChoice, MaskSettings, MaskSource, MaskTool};
+use touch2touch::app::settings::{MaskChoice, MaskSettings, MaskSource, MaskTool};
 use touch2touch::app::state::{Lookup, State};
 use touch2touch::app::{export, results};
 use touch2touch_core::dataset::PairId;
@@ -36,7 +35,6 @@ use touch2touch_core::grid::Grid;
 use touch2touch_core::label::CleanKind;
 use touch2touch_core::postprocess::{CorrectionParts, ShiftMode};
 use touch2touch_core::rig::lab;
-use touch2touch_pipeline::compare::subject::Subject;
 use touch2touch_pipeline::doctor::{Cure, Fact};
 use touch2touch_pipeline::export::{ExportChoice, Which};
 use touch2touch_pipeline::infer::engine::EngineChoice;
@@ -44,7 +42,7 @@ use touch2touch_pipeline::io::dataset::Dataset;
 use touch2touch_pipeline::io::images;
 use touch2touch_pipeline::labels::Labels;
 
-use crate::support::run;
+use crate::support::{run, simulate};
 
 #[test]
 pub(crate) fn what_is_said_of_a_data_set_is_the_same_in_the_panel_and_by_the_verb() {
@@ -138,58 +136,10 @@ fn json(arguments: &[&str], home: &Path) -> Value {
         .unwrap_or_else(|err| panic!("{arguments:?}: {err}\n{text}\n{}", String::from_utf8_lossy(&output.stderr)))
 }
 
-/// Compares every pose, comparison and mask that the studio shows of a pair with what the verbs say of it.
-fn assert_same(place: Place, path: &str, home: &Path, pairs: usize) -> BTreeMap<String, usize> {
-    let limit = pairs.to_string();
-    let poses = json(&["pose", path, "--imprint", "both", "--limit", &limit], home);
-    let out = home.join("generated");
-    let generate = ["generate", path, "--finger", "both", "--out", out.to_str().unwrap(), "--limit", &limit];
-    let generated = json(&generate, home);
-    let mut studio = Studio::open(place, home);
-    let mut compared: BTreeMap<String, usize> = BTreeMap::new();
-    let listed = studio.state.library.open.as_ref().unwrap().source.dataset.index.pairs.len();
-    for pair in 0..pairs {
-        // As the verbs spread what they take.
-        studio.predict((pair * listed / pairs) as u32);
-        let state = &studio.state;
-        let name = state.pair_name();
-        for source in ImprintSource::iter() {
-            let case = poses["cases"].as_array().unwrap().iter();
-            let case = case.filter(|case| case["name"] == name && case["imprint"] == source.key()).collect::<Vec<_>>();
-            let Lookup::Ready(pose) = results::pose(state, source) else {
-                assert!(
-                    case.is_empty() || case[0]["angle_deg"].is_null(),
-                    "{name} {source:?}: only the verb has a pose"
-                );
-                continue;
-            };
-            let place = pose.object_from_grasp();
-            assert_eq!(case.len(), 1, "{name} {source:?}");
-            assert_eq!(case[0]["angle_deg"], number(pose.angle_rad.to_degrees()), "{name} {source:?}");
-            assert_eq!(case[0]["error_deg"], optional(pose.error_rad.map(f64::to_degrees)), "{name} {source:?}");
-            assert_eq!([&case[0]["y_m"], &case[0]["z_m"]], [&number(place.y_m), &number(place.z_m)], "{name}");
-            *compared.entry(case[0]["mask"].as_str().unwrap().to_owned()).or_default() += 1;
-        }
-        for finger in state.rig().pads() {
-            let Lookup::Ready(found) = results::comparison(state, finger) else { continue };
-            let key = state.finger_name(finger).to_string();
-            let row = generated["pairs"].as_array().unwrap().iter();
-            let row = row.filter(|row| row["name"] == name && row["finger"] == key.as_str()).collect::<Vec<_>>();
-            assert_eq!(row.len(), 1, "{name} {key}");
-            assert_eq!(row[0]["psnr_db"], optional(found.psnr_db), "{name} {key}");
-            assert_eq!(row[0]["ssim"], optional(found.ssim), "{name} {key}");
-            *compared.entry("comparison".to_owned()).or_default() += 1;
-        }
-    }
-    compared
-}
-
 /// A lab folder with a corrected mask and reviews, made by the verbs as a person would.
 fn lab_folder(home: &Path) -> PathBuf {
     let folder = home.join("lab");
-    let path = folder.to_str().unwrap();
-    let args = ["simulate", "--out", path, "--tools", "pattern_36", "--grasps", "3", "--seed", "5"];
-    assert!(run(&args, home).status.success());
+    simulate(&folder, "pattern_36", &["--grasps", "3", "--seed", "5"]);
     folder
 }
 
@@ -208,44 +158,6 @@ fn pictures_folder(home: &Path) -> PathBuf {
 
 fn name_of(report: &Value, pair: usize) -> String {
     report["cases"][pair]["name"].as_str().unwrap().to_owned()
-}
-
-#[test]
-fn on_the_demo_the_studio_says_what_the_verbs_say() {
-    let home = tempfile::tempdir().unwrap();
-    let found = assert_same(Place::Demo, "demo", home.path(), 2);
-    assert_eq!((found.get("unet"), found.get("comparison")), (Some(&4), Some(&4)), "{found:?}");
-}
-
-#[test]
-fn two_predictions_are_compared_by_one_function() {
-    let home = tempfile::tempdir().unwrap();
-    let (a, b) = ("prediction:seed=7,shift=raw", "mean:seeds=2");
-    let mut studio = Studio::open(Place::Demo, home.path());
-    studio.send(ViewCommand::ShowPanes([Pane::Compare].into_iter().collect()).into());
-    let compared = CompareChoice { a: a.parse().unwrap(), b: b.parse().unwrap(), mode: CompareMode::default() };
-    let shown = compared.clone();
-    studio.send(prefer(move |s| *s.compare_mut() = shown.clone()).into());
-    studio.send(LibraryCommand::Select(PairId(40)).into());
-    let state = &studio.state;
-    let report = json(&["compare", "demo", "--pair", state.pair_name(), "--a", a, "--b", b], home.path());
-    let fingers = report["fingers"].as_array().unwrap();
-    assert_eq!(fingers.len(), 2);
-    for (pad, finger) in state.rig().pads().zip(fingers) {
-        for (key, [one, other]) in [
-            ("a", [&compared.a, &Subject::Measured]),
-            ("b", [&compared.b, &Subject::Measured]),
-            ("a_b", [&compared.a, &compared.b]),
-        ] {
-            let found = results::subjects_compared(state, one, other, pad).ready().expect(key);
-            assert_eq!(finger[key]["psnr_db"], optional(found.psnr_db), "{key}");
-            assert_eq!(finger[key]["ssim"], optional(found.ssim), "{key}");
-        }
-    }
-    for (key, subject) in [("a_deg", &compared.a), ("b_deg", &compared.b)] {
-        let pose = results::subject_pose(state, subject).expect("a pose");
-        assert_eq!(report["poses"][key], number(pose.angle_rad.to_degrees()), "{key}");
-    }
 }
 
 #[test]
@@ -310,47 +222,9 @@ fn on_a_lab_folder_drawn_masks_and_reviews_count_in_both() {
     assert!(studios.len() >= 4, "{:?}", studios.keys());
     assert!(studios == verbs, "{:?} and {:?}", studios.keys(), verbs.keys());
 
-    let found = assert_same(Place::Path(folder.clone()), path, home.path(), 3);
-    assert_eq!((found["hand, unet"] + found["unet"], found["comparison"]), (6, 6), "{found:?}");
-    assert_eq!(found["hand, unet"], 2, "the measured imprints of both corrected pairs: {found:?}");
     // Left out where it is asked for.
     let without = json(&["pose", path, "--no-hand"], home.path());
     assert_eq!(without["cases"][0]["mask"], "unet");
-}
-
-#[test]
-fn on_a_folder_of_pictures_the_figures_are_of_the_files_own_pixels_in_both() {
-    let home = tempfile::tempdir().unwrap();
-    let folder = pictures_folder(home.path());
-    let found = assert_same(Place::Path(folder.clone()), folder.to_str().unwrap(), home.path(), 2);
-    assert_eq!(found["comparison"], 2, "{found:?}");
-}
-
-#[test]
-fn a_pair_in_files_is_the_same_in_both() {
-    let home = tempfile::tempdir().unwrap();
-    let folder = lab_folder(home.path());
-    let mut studio = Studio::open(Place::Path(folder.clone()), home.path());
-    studio.predict(1);
-    studio.send(LabelsCommand::AdoptAutomatic.into());
-    studio.send(ViewCommand::SelectImprint(ImprintSource::Predicted).into());
-    studio.send(LabelsCommand::AdoptAutomatic.into());
-    let name = studio.state.pair_name().to_owned();
-    for source in ImprintSource::iter() {
-        let [by_studio, by_verb] = ["studio", "verb"].map(|by| home.path().join(by));
-        studio.send(ExportCommand::Write(Output::Pair(source), by_studio.clone()).into());
-        let path = folder.to_str().unwrap();
-        let out = by_verb.to_str().unwrap();
-        let said = json(&["export", path, "--pair", &name, "--imprint", source.key(), "--out", out], home.path());
-        let files = said["files"].as_array().unwrap();
-        assert_eq!(files.len(), 3, "{said}");
-        for file in files {
-            let file = Path::new(file.as_str().unwrap());
-            let [a, b] = [&by_studio, &by_verb].map(|f| std::fs::read(f.join(file.file_name().unwrap())).unwrap());
-            assert!(a.len() > 500 && a == b, "{}: {} and {} bytes", file.display(), a.len(), b.len());
-        }
-        assert!(said["mask"].as_str().unwrap().starts_with("hand"), "{said}");
-    }
 }
 
 #[test]

@@ -38,8 +38,7 @@ fn from_opening_to_the_figures() {
     assert_eq!(bench.state.library.order.len(), 13);
     assert_eq!(bench.state.pair_name(), PAIR, "the first pair is shown at once");
     assert!(matches!(results::imprint(&bench.state, ImprintSource::Measured, RIGHT), Lookup::Waiting));
-    bench.send(panes(&[Pane::Measured, Pane::Predicted, Pane::Compare, Pane::Metrics]));
-    bench.settle();
+    bench.run(panes(&[Pane::Measured, Pane::Predicted, Pane::Compare, Pane::Metrics]));
     assert!(bench.state.tasks.is_idle());
     assert_eq!(results::imprint(&bench.state, ImprintSource::Measured, RIGHT).ready().unwrap().size(), IMPRINT_SIZE);
     assert!(matches!(
@@ -66,8 +65,7 @@ fn from_opening_to_the_figures() {
     assert!(bench.state.tasks.running.is_empty());
     assert_eq!(bench.generated(), runs);
     // Another range mapping needs no model.
-    bench.send(prefer(|s| s.shift = ShiftMode::Raw));
-    bench.settle();
+    bench.run(prefer(|s| s.shift = ShiftMode::Raw));
     assert!(results::comparison(&bench.state, RIGHT).ready().is_some());
     assert_eq!(bench.generated(), runs);
 }
@@ -79,17 +77,14 @@ fn what_is_not_on_screen_is_not_computed() {
     assert_eq!(bench.state.results.samples.len(), 0, "no pane, no work");
     bench.send(panes(&[Pane::Log, Pane::Settings]));
     assert!(demand::demands(&bench.state).is_empty());
-    bench.send(panes(&[Pane::GelSlim]));
-    bench.settle();
+    bench.run(panes(&[Pane::GelSlim]));
     let loaded = bench.state.results.samples.len();
     assert_eq!(loaded, 5, "the pair shown and four neighbors on the one side that has any");
     assert!(bench.state.results.estimates.is_empty());
     bench.send(panes(&[Pane::Browser]));
-    bench.send(LibraryCommand::ShowRows(0..3));
-    bench.settle();
+    bench.run(LibraryCommand::ShowRows(0..3));
     assert_eq!(bench.state.results.thumbnails.len(), 3);
-    bench.send(panes(&[Pane::Measured]));
-    bench.settle();
+    bench.run(panes(&[Pane::Measured]));
     let masked = |finger| results::mask_in_force(&bench.state, ImprintSource::Measured, finger).is_ok();
     assert!(masked(RIGHT) && !masked(lab::LEFT), "only the active finger is on screen");
     assert_eq!(bench.state.results.samples.len(), loaded, "thumbnails of loaded pairs need no file");
@@ -98,21 +93,17 @@ fn what_is_not_on_screen_is_not_computed() {
 #[test]
 fn a_late_result_lands_under_its_own_key() {
     let mut bench = Bench::open();
-    bench.send(panes(&[Pane::Predicted]));
-    bench.settle();
+    bench.run(panes(&[Pane::Predicted]));
     bench.send(PredictCommand::Generate);
     let first = bench.state.pair_key().unwrap();
-    bench.send(LibraryCommand::Step(1));
-    bench.settle();
+    bench.run(LibraryCommand::Step(1));
     assert!(results::chosen(&bench.state, RIGHT).is_none(), "the pair now shown has no prediction");
     assert!(results::shown(&bench.state, first.finger(RIGHT)).is_some());
-    bench.send(LibraryCommand::Step(-1));
-    bench.settle();
+    bench.run(LibraryCommand::Step(-1));
     assert!(results::imprint(&bench.state, ImprintSource::Predicted, RIGHT).ready().is_some());
     // Of a data set that is not open any more nothing is kept.
     bench.send(PredictCommand::GenerateNewSeed);
-    bench.send(LibraryCommand::Reload);
-    bench.settle();
+    bench.run(LibraryCommand::Reload);
     assert!(bench.state.results.predictions.is_empty() && bench.state.tasks.running.is_empty());
     assert_eq!(bench.state.pair_name(), PAIR);
 }
@@ -123,12 +114,10 @@ fn only_the_last_opening_counts() {
     let another = bench.another();
     bench.send(LibraryCommand::Open(another));
     bench.send(LibraryCommand::Open(Place::Path("missing".into())));
-    bench.send(LibraryCommand::Open(Place::Demo));
-    bench.settle();
+    bench.run(LibraryCommand::Open(Place::Demo));
     assert_eq!(bench.state.library.open.as_ref().unwrap().place, Place::Demo);
     assert_eq!((bench.state.library.opening.clone(), bench.errors()), (None, 0));
-    bench.send(LibraryCommand::Open(Place::Path("missing".into())));
-    bench.settle();
+    bench.run(LibraryCommand::Open(Place::Path("missing".into())));
     assert!(bench.state.library.failure.is_some());
     assert_eq!(bench.errors(), 1);
     assert!(bench.state.library.open.is_some(), "what was open stays open");
@@ -138,8 +127,7 @@ fn only_the_last_opening_counts() {
 #[test]
 fn jobs_stop_when_told() {
     let mut bench = Bench::open();
-    bench.send(panes(&[Pane::Predicted]));
-    bench.settle();
+    bench.run(panes(&[Pane::Predicted]));
     bench.send(PredictCommand::Generate);
     bench.send(TasksCommand::CancelAll);
     bench.tick();
@@ -153,20 +141,17 @@ fn jobs_stop_when_told() {
 fn a_failure_is_said_once_and_not_tried_again_by_itself() {
     let mut bench = Bench::open();
     bench.spoil(1, true);
-    bench.send(panes(&[Pane::Measured]));
-    bench.settle();
+    bench.run(panes(&[Pane::Measured]));
     assert_eq!(bench.errors(), 0, "pair 1 was only loaded ahead");
     let loads = bench.state.results.samples.len();
-    bench.send(LibraryCommand::Select(PairId(1)));
-    bench.settle();
+    bench.run(LibraryCommand::Select(PairId(1)));
     assert_eq!(bench.errors(), 1);
     assert!(matches!(results::imprint(&bench.state, ImprintSource::Measured, RIGHT), Lookup::Failed(_)));
     bench.settle();
     assert_eq!(bench.errors(), 1);
     assert!(bench.state.results.samples.len() > loads, "the neighbors are loaded all the same");
     bench.spoil(1, false);
-    bench.send(TasksCommand::Retry);
-    bench.settle();
+    bench.run(TasksCommand::Retry);
     assert!(results::imprint(&bench.state, ImprintSource::Measured, RIGHT).ready().is_some());
 }
 

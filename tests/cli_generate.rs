@@ -1,30 +1,18 @@
 //! `generate` and what it keeps as a user runs it, with the tiny bundle of the tests.
 
 use std::path::{Path, PathBuf};
-use std::process::Output;
 
 use serde_json::Value;
 
-use crate::support::run;
-
-fn json(output: &Output) -> Value {
-    let error = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{error}");
-    serde_json::from_slice(&output.stdout).unwrap_or_else(|err| panic!("{err}: {error}"))
-}
+use crate::support::{copy_folder, edit_json, json, run, simulate, tiny};
 
 /// The tiny bundle, with imprints as large as the simulated ones: they are compared.
 pub(crate) fn full_size_bundle(dir: &Path) -> PathBuf {
-    let (from, to) = (Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles/generator"), dir.join("bundle"));
-    std::fs::create_dir(&to).unwrap();
-    for entry in std::fs::read_dir(from).unwrap() {
-        let path = entry.unwrap().path();
-        std::fs::copy(&path, to.join(path.file_name().unwrap())).unwrap();
-    }
-    let manifest = to.join("manifest.json");
-    let mut value: Value = serde_json::from_slice(&std::fs::read(&manifest).unwrap()).unwrap();
-    value["output"]["imprint_size"] = serde_json::json!([175, 140]);
-    std::fs::write(manifest, value.to_string()).unwrap();
+    let to = dir.join("bundle");
+    copy_folder(&tiny("generator"), &to);
+    edit_json(&to.join("manifest.json"), |manifest| {
+        manifest["output"]["imprint_size"] = serde_json::json!([175, 140]);
+    });
     to
 }
 
@@ -33,9 +21,8 @@ fn predictions_are_kept_and_found_again() {
     let dir = tempfile::tempdir().unwrap();
     let (home, set, out) = (dir.path().join("home"), dir.path().join("set"), dir.path().join("out"));
     let bundle = full_size_bundle(dir.path());
+    simulate(&set, "pattern_36", &["--grasps", "1", "--seed", "3"]);
     let [set, out, bundle] = [&set, &out, &bundle].map(|p| p.to_str().unwrap());
-    let made = run(&["simulate", "--out", set, "--tools", "pattern_36", "--grasps", "1", "--seed", "3"], &home);
-    assert!(made.status.success());
     let generate = |more: &[&str]| {
         let fixed = ["generate", set, "--out", out, "--finger", "both", "--bundle", bundle];
         run(&[&fixed[..], &["--runtime", "rten", "--json"], more].concat(), &home)

@@ -10,25 +10,21 @@ use touch2touch_core::dataset::PairId;
 use touch2touch_core::grid::{Grid, Mask};
 use touch2touch_core::label::{Marks, Provenance};
 use touch2touch_core::rig::{PadId, lab};
-use touch2touch_core::sim;
 use touch2touch_pipeline::export::import::{Import, ImportSetup, import_masks, plan_import};
 use touch2touch_pipeline::export::{DrawnMasks, ExportChoice, ExportSetup, Which, export_masks};
 use touch2touch_pipeline::io::dataset::Dataset;
 use touch2touch_pipeline::io::exchange::{Format, MANIFEST, PARTS};
 use touch2touch_pipeline::io::images;
-use touch2touch_pipeline::io::simulated::{Layout, write_pair, write_tools};
+use touch2touch_pipeline::io::simulated::Layout;
 use touch2touch_pipeline::job::{Cancel, JobCx, Progress};
 use touch2touch_pipeline::labels::{DrawnMask, Labels, MaskPlace, Operation, PairLabels, Review};
+
+use crate::support::write_grasps;
 
 /// A data set of four grasps whose masks Anna painted, each with some ignored pixels and one without contact; the last pair
 /// is in progress, the others are done.
 fn painted(root: &Path) -> Dataset {
-    let tool = &catalog::tools()[0];
-    for index in 0..4 {
-        let sample = sim::simulate(tool, sim::random_grasp(index + 3), index, &sim::SimConfig::default());
-        write_pair(root, Layout::Train, &tool.name, index, &sample).unwrap();
-    }
-    write_tools(root, &[(tool.name.as_str(), tool.seen, tool.mesh())]).unwrap();
+    write_grasps(root, Layout::Train, &catalog::tools()[..1], 4);
     let dataset = Dataset::open(root).unwrap();
     for (at, entry) in (0..).zip(&dataset.index.pairs) {
         let sample = dataset.load(PairId(at)).unwrap();

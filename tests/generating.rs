@@ -2,7 +2,7 @@
 //! the disk, and inputs that make no sense (row E22 of the list of numerical failures, from image to picture).
 
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use rayon::prelude::*;
 use strum::IntoEnumIterator as _;
@@ -17,9 +17,8 @@ use touch2touch_pipeline::job::JobCx;
 use touch2touch_pipeline::steps::bundles::{self, BundleInfo};
 use touch2touch_pipeline::steps::models::{GenerateInput, Models};
 
-fn fixture() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles/generator")
-}
+use crate::models::running::{config, go_on, largest_difference};
+use crate::support::tiny;
 
 fn open(dir: &Path) -> Generator {
     Generator::open(&Bundle::open(dir).unwrap(), EngineChoice::Rten).unwrap()
@@ -32,19 +31,6 @@ fn image(phase: f32) -> RgbGrid {
     })
 }
 
-fn go_on(_: Progress) -> ControlFlow<()> {
-    ControlFlow::Continue(())
-}
-
-fn config() -> GenerateConfig {
-    GenerateConfig { steps: 6, ..Default::default() }
-}
-
-fn largest_difference(a: &RawPrediction, b: &RawPrediction) -> f32 {
-    let pairs = a.channels.iter().zip(&b.channels).flat_map(|(a, b)| a.as_slice().iter().zip(b.as_slice()));
-    pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
-}
-
 /// How often each graph ran: condition encoder, denoiser, decoder.
 fn runs(generator: &mut Generator) -> [u64; 3] {
     generator.graphs().map(|graph| graph.runs())
@@ -52,7 +38,7 @@ fn runs(generator: &mut Generator) -> [u64; 3] {
 
 #[test]
 fn each_image_is_encoded_once_however_many_seeds_it_has() {
-    let mut generator = open(&fixture());
+    let mut generator = open(&tiny("generator"));
     let (a, b) = (image(0.0), image(1.0));
     let items: Vec<Item> = [1, 2, 3].iter().flat_map(|&seed| [0, 1].map(|image| Item { image, seed })).collect();
     let made = generator.run(&[&a, &b], &items, &config(), &mut go_on).unwrap();
@@ -95,7 +81,7 @@ impl Observer for Looker {
 
 #[test]
 fn previews_show_what_is_coming_and_change_nothing() {
-    let mut generator = open(&fixture());
+    let mut generator = open(&tiny("generator"));
     let items = [0, 1].map(|image| Item { image, seed: 7 });
     for sampler in Sampler::iter() {
         let config = GenerateConfig { sampler, ..config() };
@@ -122,7 +108,7 @@ fn previews_show_what_is_coming_and_change_nothing() {
 /// Row E22: alpha bar of 0 and 1, few and many steps, every eta; and images that no camera takes.
 #[test]
 fn e22_every_input_gives_finite_pictures_or_a_clear_error() {
-    let mut generator = open(&fixture());
+    let mut generator = open(&tiny("generator"));
     let huge = |v: f32| Grid::filled(43, 32, [v, -v, v]);
     let images = [huge(0.0), huge(255.0), huge(-255.0), huge(1e-30), huge(1e30), huge(f32::MAX), image(0.0)];
     for image in &images {
@@ -159,7 +145,7 @@ fn e22_every_input_gives_finite_pictures_or_a_clear_error() {
 }
 
 fn bundle() -> BundleInfo {
-    bundles::find(&[fixture()])
+    bundles::find(&[tiny("generator")])
         .bundles
         .into_iter()
         .find(|b| b.name == "Tiny generator of the tests")
@@ -221,10 +207,7 @@ fn many_threads_of_a_pool_predict_and_mask_with_one_model() {
     let (done, told) = std::sync::mpsc::channel();
     std::thread::spawn(move || {
         let models = Models::new(None);
-        let bundle = |name| {
-            let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles").join(name);
-            BundleInfo::of(&Bundle::open(&folder).unwrap())
-        };
+        let bundle = |name| BundleInfo::of(&Bundle::open(&tiny(name)).unwrap());
         let (generator, mask) = (bundle("generator"), bundle("mask"));
         let difference = image(0.0);
         let predicted = |seed| {

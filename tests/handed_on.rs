@@ -5,6 +5,8 @@ use std::process::{Command, Output};
 
 use serde_json::Value;
 
+use crate::support::json;
+
 /// Runs a copy of the program that lies alone in `home`, with nothing of this machine's settings.
 fn alone(home: &Path, args: &[&str]) -> Output {
     let copy = home.join("touch2touch");
@@ -13,11 +15,6 @@ fn alone(home: &Path, args: &[&str]) -> Output {
         std::fs::hard_link(program, &copy).or_else(|_| std::fs::copy(program, &copy).map(drop)).unwrap();
     }
     Command::new(copy).args(args).current_dir(home).env_clear().env("HOME", home).output().unwrap()
-}
-
-fn json(output: &Output) -> Value {
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    serde_json::from_slice(&output.stdout).unwrap()
 }
 
 #[test]

@@ -43,6 +43,8 @@ use touch2touch_pipeline::io::images;
 use touch2touch_pipeline::io::masks::{FOLDER, MaskStore};
 use touch2touch_pipeline::job::JobCx;
 
+use crate::support::copy_folder;
+
 /// What the child plays: `FOLDER` and the script's seed.
 const ROLE: &str = "TOUCH2TOUCH_KILL_TEST";
 /// Kills of one run of the test; the next number of rounds in one folder.
@@ -210,18 +212,6 @@ fn played(folder: &Path, seed: u64, acts: usize) -> Vec<BTreeMap<String, Labels>
         all.push(now.clone());
     }
     all
-}
-
-/// Copies a folder with all that is in it.
-fn copy(from: &Path, to: &Path) {
-    std::fs::create_dir_all(to).unwrap();
-    for entry in std::fs::read_dir(from).unwrap().map(|entry| entry.unwrap()) {
-        let to = to.join(entry.file_name());
-        match entry.file_type().unwrap().is_dir() {
-            true => copy(&entry.path(), &to),
-            false => drop(std::fs::copy(entry.path(), to).unwrap()),
-        }
-    }
 }
 
 /// What a child said before its end.
@@ -400,7 +390,7 @@ fn no_confirmed_stroke_is_lost_to_a_kill() {
                         let mut rng = ChaCha8Rng::seed_from_u64(seed + 1_000_000);
                         let (acts, after) = (rng.random_range(1..16), rng.random_range(0..30_000));
                         let beside = tempfile::tempdir().unwrap();
-                        copy(&folder, &beside.path().join("set"));
+                        copy_folder(&folder, &beside.path().join("set"));
                         let said = kill_one(&folder, seed, acts, Duration::from_micros(after));
                         let played = played(&beside.path().join("set"), seed, said.begun);
                         let newer = compare(&folder, &played, &said);

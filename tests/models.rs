@@ -4,26 +4,7 @@ use std::path::{Path, PathBuf};
 
 use touch2touch_pipeline::infer::bundle::{Bundle, MANIFEST, find};
 
-fn fixture(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles").join(name)
-}
-
-/// A copy of a fixture that may be damaged.
-fn copy(name: &str) -> tempfile::TempDir {
-    let dir = tempfile::tempdir().unwrap();
-    for entry in std::fs::read_dir(fixture(name)).unwrap() {
-        let path = entry.unwrap().path();
-        std::fs::copy(&path, dir.path().join(path.file_name().unwrap())).unwrap();
-    }
-    dir
-}
-
-fn edit(dir: &Path, change: impl FnOnce(&mut serde_json::Value)) {
-    let path = dir.join(MANIFEST);
-    let mut manifest = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
-    change(&mut manifest);
-    std::fs::write(path, manifest.to_string()).unwrap();
-}
+use crate::support::{edit_json, tiny, tiny_with};
 
 /// Everything said about a bundle that must be refused.
 fn refusal(dir: &Path) -> String {
@@ -32,25 +13,24 @@ fn refusal(dir: &Path) -> String {
 
 #[test]
 fn whole_bundles_open() {
-    let generator = Bundle::open(&fixture("generator")).unwrap();
+    let generator = Bundle::open(&tiny("generator")).unwrap();
     assert_eq!(generator.name(), "Tiny generator of the tests");
     assert_eq!(generator.generator().unwrap().defaults.steps, 6);
     assert_eq!(generator.hash().len(), 64);
     assert!(generator.provenance()["made_by"].is_string());
-    let mask = Bundle::open(&fixture("mask")).unwrap();
+    let mask = Bundle::open(&tiny("mask")).unwrap();
     assert_eq!(mask.mask_unet().unwrap().output.classes, 2);
     assert!(mask.generator().is_none());
 }
 
 #[test]
 fn a_tool_classifier_opens_and_a_wrong_one_is_refused() {
-    let bundle = Bundle::open(&fixture("classifier")).unwrap();
+    let bundle = Bundle::open(&tiny("classifier")).unwrap();
     let spec = bundle.tool_classifier().unwrap();
     assert_eq!((spec.output.classes.len(), spec.output.features), (3, Some(4)));
     assert!(bundle.generator().is_none() && bundle.mask_unet().is_none());
 
-    let dir = copy("classifier");
-    edit(dir.path(), |m| {
+    let dir = tiny_with("classifier", |m| {
         m["output"]["classes"] = serde_json::json!(["pattern_36", "pattern_36", ""]);
         m["output"]["features"] = serde_json::json!(5);
         m["input"]["rotation_deg"] = serde_json::json!(90);
@@ -63,21 +43,21 @@ fn a_tool_classifier_opens_and_a_wrong_one_is_refused() {
     ] {
         assert!(text.contains(expected), "`{expected}` is missing in:\n{text}");
     }
-    edit(dir.path(), |m| m["output"]["classes"] = serde_json::json!(["a", "b"]));
+    edit_json(&dir.path().join(MANIFEST), |m| m["output"]["classes"] = serde_json::json!(["a", "b"]));
     let text = refusal(dir.path());
     assert!(text.contains("output `logits`: shape [N, 3], but the manifest says [N, 2]"), "{text}");
 }
 
 #[test]
 fn a_refusal_lists_everything_that_is_wrong() {
-    let dir = copy("generator");
+    let dir = tiny_with("generator", |_| {});
     let decoder = dir.path().join("decoder.onnx");
     let mut bytes = std::fs::read(&decoder).unwrap();
     let last = bytes.len() - 1;
     bytes[last] ^= 1;
     std::fs::write(&decoder, bytes).unwrap();
     std::fs::remove_file(dir.path().join("condition_encoder.onnx")).unwrap();
-    edit(dir.path(), |m| {
+    edit_json(&dir.path().join(MANIFEST), |m| {
         m["latent"]["shape"] = serde_json::json!([3, 4, 4]);
         m["input"]["std"] = serde_json::json!([0.07, 0.0, 0.06]);
         m["schedule"]["beta_end"] = serde_json::json!(1.5);
@@ -107,8 +87,7 @@ fn a_refusal_lists_everything_that_is_wrong() {
 
 #[test]
 fn shapes_that_disagree_with_the_manifest_are_refused() {
-    let dir = copy("generator");
-    edit(dir.path(), |m| {
+    let dir = tiny_with("generator", |m| {
         m["latent"]["shape"] = serde_json::json!([3, 4, 4]);
         m["output"]["channels"] = serde_json::json!(1);
         m["input"]["size"] = serde_json::json!([16, 32]);
@@ -128,8 +107,7 @@ fn shapes_that_disagree_with_the_manifest_are_refused() {
 #[test]
 fn other_versions_formats_and_paths_are_refused() {
     let with = |change: fn(&mut serde_json::Value)| {
-        let dir = copy("mask");
-        edit(dir.path(), change);
+        let dir = tiny_with("mask", change);
         refusal(dir.path())
     };
     let newer = with(|m| m["format_version"] = 3.into());
@@ -137,8 +115,7 @@ fn other_versions_formats_and_paths_are_refused() {
     // The second version declares its sensors; the first never did.
     assert!(with(|m| m["format_version"] = 2.into()).contains("input: invalid type"));
     let color = serde_json::json!({"key": "gelslim", "kind": "color", "size": [427, 320]});
-    let dir = copy("mask");
-    edit(dir.path(), |m| {
+    let dir = tiny_with("mask", |m| {
         m["format_version"] = 2.into();
         m["input"]["sensor"] = color;
     });
@@ -146,8 +123,7 @@ fn other_versions_formats_and_paths_are_refused() {
     assert!(with(|m| m["format"] = "other".into()).contains("another program's file"));
     assert!(with(|m| m["kind"] = "painter".into()).contains("kind: \"painter\" is unknown"));
     for path in ["../mask_unet.onnx", "/etc/hostname", ""] {
-        let dir = copy("mask");
-        edit(dir.path(), |m| m["files"]["mask_unet"]["path"] = path.into());
+        let dir = tiny_with("mask", |m| m["files"]["mask_unet"]["path"] = path.into());
         assert!(refusal(dir.path()).contains("leads out of the folder"), "{path}");
     }
     assert!(with(|m| m["files"] = serde_json::json!({})).contains("files.mask_unet: missing"));
@@ -163,9 +139,8 @@ fn other_versions_formats_and_paths_are_refused() {
 
 #[test]
 fn bundles_are_found_once_and_broken_ones_reported() {
-    let broken = copy("mask");
-    edit(broken.path(), |m| m["output"]["classes"] = 7.into());
-    let roots = [fixture(""), fixture("generator"), broken.path().to_path_buf(), PathBuf::from("/nowhere")];
+    let broken = tiny_with("mask", |m| m["output"]["classes"] = 7.into());
+    let roots = [tiny(""), tiny("generator"), broken.path().to_path_buf(), PathBuf::from("/nowhere")];
     let found = find(&roots);
     let names: Vec<&str> = found.bundles.iter().map(Bundle::name).collect();
     let all = [
@@ -181,7 +156,7 @@ fn bundles_are_found_once_and_broken_ones_reported() {
     assert!(found.problems.iter().any(|p| p.what.contains("output.classes")));
 }
 
-mod running {
+pub(crate) mod running {
     use std::ops::ControlFlow;
 
     use touch2touch_core::diffusion::{GenerateConfig, Progress, Tensor};
@@ -207,22 +182,22 @@ mod running {
         }
     }
 
-    fn image() -> RgbGrid {
+    pub(crate) fn image() -> RgbGrid {
         Grid::from_fn(43, 32, |x, y| {
             let bar = if (x + y / 2) % 20 < 5 { 40.0 } else { 0.0 };
             [bar, -bar * 0.5, (x as f32 * 0.3).sin() * 10.0]
         })
     }
 
-    fn go_on(_: Progress) -> ControlFlow<()> {
+    pub(crate) fn go_on(_: Progress) -> ControlFlow<()> {
         ControlFlow::Continue(())
     }
 
-    fn config() -> GenerateConfig {
+    pub(crate) fn config() -> GenerateConfig {
         GenerateConfig { steps: 6, ..Default::default() }
     }
 
-    fn largest_difference(a: &RawPrediction, b: &RawPrediction) -> f32 {
+    pub(crate) fn largest_difference(a: &RawPrediction, b: &RawPrediction) -> f32 {
         let pairs = a.channels.iter().zip(&b.channels).flat_map(|(a, b)| a.as_slice().iter().zip(b.as_slice()));
         pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
     }
@@ -230,7 +205,7 @@ mod running {
     /// Each graph on each engine against onnx's own evaluator in numpy.
     #[test]
     fn every_engine_computes_what_the_standard_says() {
-        let text = std::fs::read(fixture("reference.json")).unwrap();
+        let text = std::fs::read(tiny("reference.json")).unwrap();
         let reference: serde_json::Value = serde_json::from_slice(&text).unwrap();
         let wave =
             |n: usize, f: fn(f64) -> f64, step: f64| (0..n).map(|i| f(f64::from(i as u32) * step) as f32).collect();
@@ -247,7 +222,7 @@ mod running {
         for choice in engines() {
             let engine = resolve(choice).unwrap();
             let load = |role: Role| {
-                let file = fixture("generator").join(format!("{}.onnx", role.key()));
+                let file = tiny("generator").join(format!("{}.onnx", role.key()));
                 Graph::load(engine, role, &file.into()).unwrap()
             };
             let condition = load(Role::ConditionEncoder)
@@ -268,7 +243,7 @@ mod running {
 
     #[test]
     fn engines_agree_from_image_to_picture() {
-        let bundle = Bundle::open(&fixture("generator")).unwrap();
+        let bundle = Bundle::open(&tiny("generator")).unwrap();
         let results: Vec<RawPrediction> = engines()
             .into_iter()
             .map(|choice| Generator::open(&bundle, choice).unwrap().generate(&image(), &config(), &mut go_on).unwrap())
@@ -282,7 +257,7 @@ mod running {
 
     #[test]
     fn a_seed_gives_the_same_picture_again_and_another_seed_another() {
-        let bundle = Bundle::open(&fixture("generator")).unwrap();
+        let bundle = Bundle::open(&tiny("generator")).unwrap();
         for choice in engines() {
             let mut generator = Generator::open(&bundle, choice).unwrap();
             let mut go = |seed| generator.generate(&image(), &GenerateConfig { seed, ..config() }, &mut go_on).unwrap();
@@ -302,7 +277,7 @@ mod running {
 
     #[test]
     fn pictures_become_depth_in_every_reading() {
-        let bundle = Bundle::open(&fixture("generator")).unwrap();
+        let bundle = Bundle::open(&tiny("generator")).unwrap();
         let mut generator = Generator::open(&bundle, EngineChoice::Auto).unwrap();
         let raw = generator.generate(&image(), &config(), &mut go_on).unwrap();
         let depth = |mode| generator.depth(&raw, mode).unwrap();
@@ -317,8 +292,8 @@ mod running {
 
     #[test]
     fn impossible_requests_are_errors() {
-        let generator = Bundle::open(&fixture("generator")).unwrap();
-        let mask = Bundle::open(&fixture("mask")).unwrap();
+        let generator = Bundle::open(&tiny("generator")).unwrap();
+        let mask = Bundle::open(&tiny("mask")).unwrap();
         assert!(matches!(Generator::open(&mask, EngineChoice::Rten), Err(GenerateError::NotAGenerator(_))));
         assert!(matches!(MaskModel::open(&generator, EngineChoice::Rten), Err(ImprintError::NotAMaskUnet(_))));
         let mut model = Generator::open(&generator, EngineChoice::Rten).unwrap();
@@ -332,14 +307,14 @@ mod running {
         let holes = Grid::filled(4, 4, [f32::NAN; 3]);
         let result = model.generate(&holes, &config(), &mut go_on);
         assert!(matches!(result, Err(GenerateError::BadImage { bad: 48, .. })));
-        let damaged = copy("mask");
+        let damaged = tiny_with("mask", |_| {});
         std::fs::write(damaged.path().join("mask_unet.onnx"), b"gone").unwrap();
         for choice in engines() {
             let engine = resolve(choice).unwrap();
             let load = |file: PathBuf| Graph::load(engine, Role::MaskUnet, &file.into()).unwrap_err().to_string();
             assert!(load(damaged.path().join("mask_unet.onnx")).contains("cannot load the graph `mask_unet`"));
             assert!(load(damaged.path().join("absent.onnx")).contains("absent.onnx"));
-            let mut graph = Graph::load(engine, Role::MaskUnet, &fixture("mask/mask_unet.onnx").into()).unwrap();
+            let mut graph = Graph::load(engine, Role::MaskUnet, &tiny("mask/mask_unet.onnx").into()).unwrap();
             let wrong = Tensor::filled(vec![1, 1, 3, 3], 0.0);
             assert!(graph.run(&[("imprint", Input::F32(&wrong))], "logits", &[1, 2, 14, 18]).is_err());
             assert!(graph.run(&[], "logits", &[1, 2, 14, 18]).is_err());
@@ -348,7 +323,7 @@ mod running {
 
     #[test]
     fn the_mask_model_marks_what_is_deep_and_keeps_size_and_orientation() {
-        let bundle = Bundle::open(&fixture("mask")).unwrap();
+        let bundle = Bundle::open(&tiny("mask")).unwrap();
         for choice in engines() {
             let mut model = MaskModel::open(&bundle, choice).unwrap();
             // The graph answers "deeper than 5 mm"; the bundle turns the imprint by 180 degrees and back.
@@ -367,7 +342,7 @@ mod running {
 
     #[test]
     fn the_classifier_names_what_is_deepest_one_by_one_or_in_a_batch() {
-        let bundle = Bundle::open(&fixture("classifier")).unwrap();
+        let bundle = Bundle::open(&tiny("classifier")).unwrap();
         // The classes are the quarters of the turned imprint: top left, top right, bottom left.
         let deep = |right: bool, low: bool| {
             Grid::from_fn(18, 14, |x, y| if (x >= 9) == right && (y >= 7) == low { 0.009 } else { 0.002 })
@@ -388,7 +363,7 @@ mod running {
             let nothing = Grid::filled(18, 14, f32::NAN);
             assert!(matches!(model.classify(&[&nothing]), Err(ImprintError::Nothing { .. })));
             assert!(model.classify(&[]).unwrap().is_empty());
-            let mask = Bundle::open(&fixture("mask")).unwrap();
+            let mask = Bundle::open(&tiny("mask")).unwrap();
             assert!(matches!(ToolClassifier::open(&mask, choice), Err(ImprintError::NotAClassifier(_))));
         }
     }
@@ -441,7 +416,7 @@ mod trial {
     use std::process::Output;
 
     use super::*;
-    use crate::support::run;
+    use crate::support::{run, simulate};
 
     fn text(output: &Output) -> String {
         String::from_utf8_lossy(&[output.stdout.as_slice(), &output.stderr].concat()).into_owned()
@@ -480,7 +455,7 @@ mod trial {
     /// A copy of the tiny mask bundle with another graph: one node of type `op` from `imprint` (and a list of numbers,
     /// if there is one) to `logits`.
     fn with_graph(op: &str, shape: &[i64]) -> tempfile::TempDir {
-        let dir = copy("mask");
+        let dir = tiny_with("mask", |_| {});
         let mut node = bytes(1, b"imprint");
         let mut graph = Vec::new();
         if !shape.is_empty() {
@@ -496,7 +471,7 @@ mod trial {
         let model = [whole(1, 8), bytes(7, &graph), opset].concat();
         std::fs::write(dir.path().join("mask_unet.onnx"), &model).unwrap();
         let sum: String = <sha2::Sha256 as sha2::Digest>::digest(&model).iter().map(|b| format!("{b:02x}")).collect();
-        edit(dir.path(), |m| m["files"]["mask_unet"]["sha256"] = sum.into());
+        edit_json(&dir.path().join(MANIFEST), |m| m["files"]["mask_unet"]["sha256"] = sum.into());
         Bundle::open(dir.path()).expect("nothing is wrong that can be seen without an engine");
         dir
     }
@@ -505,7 +480,7 @@ mod trial {
     fn whole_bundles_are_taken_and_the_verdict_is_kept() {
         let data = tempfile::tempdir().unwrap();
         for name in ["generator", "mask", "classifier"] {
-            let checked = run(&["bundle", "check", fixture(name).to_str().unwrap(), "--json"], data.path());
+            let checked = run(&["bundle", "check", tiny(name).to_str().unwrap(), "--json"], data.path());
             assert!(checked.status.success(), "{}", text(&checked));
             let report: serde_json::Value = serde_json::from_slice(&checked.stdout).unwrap();
             assert_eq!((&report["engines"][0], &report["problems"]), (&"rten".into(), &serde_json::json!([])));
@@ -549,9 +524,7 @@ mod trial {
     fn a_verb_refuses_such_a_bundle_before_its_engine_sees_it() {
         let data = tempfile::tempdir().unwrap();
         let set = data.path().join("set");
-        let made =
-            run(&["simulate", "--out", set.to_str().unwrap(), "--tools", "pattern_36", "--grasps", "1"], data.path());
-        assert!(made.status.success(), "{}", text(&made));
+        simulate(&set, "pattern_36", &["--grasps", "1"]);
         let pose = |bundle: &Path| {
             let args = ["pose", set.to_str().unwrap(), "--mask", "unet", "--runtime", "rten", "--mask-bundle"];
             run(&[&args[..], &[bundle.to_str().unwrap()]].concat(), data.path())
@@ -561,7 +534,7 @@ mod trial {
         assert!(text(&refused).contains("does not take the model bundle"), "{}", text(&refused));
         assert_eq!(kept(data.path()), 0);
         // A good one is tried once, and then known.
-        let good = pose(&fixture("mask"));
+        let good = pose(&tiny("mask"));
         assert!(!text(&good).contains("does not take"), "{}", text(&good));
         assert_eq!(kept(data.path()), 1);
     }

@@ -19,18 +19,13 @@ use touch2touch_pipeline::infer::engine::EngineChoice;
 use touch2touch_pipeline::steps::bundles;
 
 use crate::cli_generate::full_size_bundle;
-use crate::support::run;
+use crate::support::{copy_folder, edit_json, error_text, json, run, simulate};
 
 /// A simulated pair with labels: a mask on the right finger's prediction (DDIM,
 /// 2 steps, eta 0.1), an accepted pose of it, a note. And the bundle that predicted it.
 fn labeled(dir: &Path) -> [PathBuf; 2] {
     let (set, bundle) = (dir.join("set"), full_size_bundle(dir));
-    let path = set.to_str().unwrap();
-    assert!(
-        run(&["simulate", "--out", path, "--tools", "pattern_36", "--grasps", "1", "--seed", "3"], dir)
-            .status
-            .success()
-    );
+    simulate(&set, "pattern_36", &["--grasps", "1", "--seed", "3"]);
     let id = bundles::open("test", bundle.as_path()).unwrap().id;
     let labels = set.join("touch2touch_masks");
     std::fs::create_dir(&labels).unwrap();
@@ -84,7 +79,7 @@ fn a_mask_on_a_prediction_is_found_by_what_decided_the_prediction() {
     let pose = |more: &[&str]| -> Value {
         let fixed = ["pose", set, "--imprint", "predicted", "--mask", "top_percent", "--bundle", bundle, "--json"];
         let done = run(&[&fixed[..], &choices, more].concat(), dir.path());
-        serde_json::from_slice::<Value>(&done.stdout).unwrap()["cases"][0].clone()
+        json(&done)["cases"][0].clone()
     };
     let found = pose(&[]);
     assert_eq!(found["mask"], "hand, top_percent", "{found:#}");
@@ -96,16 +91,11 @@ fn a_mask_on_a_prediction_is_found_by_what_decided_the_prediction() {
 /// A bundle of another name and note, written anew in another folder.
 fn rebuilt(bundle: &Path, dir: &Path) -> PathBuf {
     let to = dir.join("rebuilt");
-    std::fs::create_dir(&to).unwrap();
-    for entry in std::fs::read_dir(bundle).unwrap() {
-        let file = entry.unwrap().path();
-        std::fs::copy(&file, to.join(file.file_name().unwrap())).unwrap();
-    }
-    let manifest = to.join("manifest.json");
-    let mut keys: Value = serde_json::from_slice(&std::fs::read(&manifest).unwrap()).unwrap();
-    keys["name"] = "the same again".into();
-    keys["provenance"] = serde_json::json!({"note": "written anew"});
-    std::fs::write(&manifest, serde_json::to_vec(&keys).unwrap()).unwrap();
+    copy_folder(bundle, &to);
+    edit_json(&to.join("manifest.json"), |keys| {
+        keys["name"] = "the same again".into();
+        keys["provenance"] = serde_json::json!({"note": "written anew"});
+    });
     to
 }
 
@@ -118,7 +108,7 @@ fn what_was_drawn_and_kept_under_a_bundle_is_found_when_it_was_written_anew() {
         let fixed = ["pose", set.to_str().unwrap(), "--imprint", "predicted", "--mask", "top_percent", "--json"];
         let choices = ["--runtime", "rten", "--steps", "2", "--eta", "0.1", "--sampler", "ddim"];
         let done = run(&[&fixed[..], &choices, &["--bundle", bundle.to_str().unwrap()]].concat(), dir.path());
-        serde_json::from_slice::<Value>(&done.stdout).unwrap()["cases"][0].clone()
+        json(&done)["cases"][0].clone()
     };
     let rebuilt = pose(&again);
     assert_eq!(rebuilt["mask"], "hand, top_percent", "{rebuilt:#}");
@@ -133,8 +123,8 @@ fn an_accepted_pose_is_of_one_prediction() {
     let verb = |words: &[&str], seed: &str| -> Value {
         let choices = ["--runtime", "rten", "--steps", "2", "--eta", "0.1", "--sampler", "ddim", "--seed", seed];
         let done = run(&[words, &["--bundle", bundle, "--json"], &choices].concat(), dir.path());
-        assert_eq!(done.status.code(), Some(0), "{}", String::from_utf8_lossy(&done.stderr));
-        serde_json::from_slice(&done.stdout).unwrap()
+        assert_eq!(done.status.code(), Some(0), "{}", error_text(&done));
+        json(&done)
     };
     let y_mm = |seed: &str| {
         let report = verb(&["pose", set, "--imprint", "predicted", "--mask", "top_percent"], seed);
@@ -153,6 +143,6 @@ fn an_accepted_pose_is_of_one_prediction() {
     verb(&withdraw, "42");
     assert_eq!([y_mm("42"), y_mm("7")], [None, own]);
     let refused = run(&[&withdraw[..], &["--bundle", bundle, "--steps", "2", "--seed", "9"]].concat(), dir.path());
-    let why = String::from_utf8_lossy(&refused.stderr);
+    let why = error_text(&refused);
     assert!(!refused.status.success() && why.contains("seed 9") && why.contains("seed 7"), "{why}");
 }

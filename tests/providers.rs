@@ -5,19 +5,10 @@ use std::process::Output;
 
 use serde_json::Value;
 
-use crate::support::{self, command};
-
-fn bundle(name: &str) -> String {
-    format!("{}/tests/data/bundles/{name}", env!("CARGO_MANIFEST_DIR"))
-}
+use crate::support::{self, command, error_text, json, tiny};
 
 fn run(args: &[&str], library: &str, home: &Path) -> Output {
     command(args, home).env("ORT_DYLIB_PATH", library).env("RUST_LOG", "warn").output().unwrap()
-}
-
-fn json(output: &Output) -> Value {
-    let error = String::from_utf8_lossy(&output.stderr);
-    serde_json::from_slice(&output.stdout).unwrap_or_else(|err| panic!("{err}: {error}"))
 }
 
 #[test]
@@ -72,20 +63,19 @@ fn a_provider_predicts_and_masks_and_poses_as_the_processor_does() {
 fn where_a_provider_computes_otherwise_the_processor_goes_on_and_says_so() {
     let Some(library) = support::openvino() else { return };
     let home = tempfile::tempdir().unwrap();
-    let rounding = bundle("rounding");
+    let rounding = tiny("rounding").display().to_string();
     let masked = |runtime: &str| {
         let words =
             ["pose", "demo", "--limit", "1", "--mask", "unet", "--mask-bundle", &rounding, "--runtime", runtime];
         run(&words, &library, home.path())
     };
-    let said = |output: &Output| String::from_utf8_lossy(&output.stderr).into_owned();
     let automatic = masked("auto");
-    assert!(said(&automatic).contains("it runs on the processor"), "{}", said(&automatic));
-    assert!(!said(&automatic).contains("comes out otherwise than on the processor, by 0.0"), "{}", said(&automatic));
+    assert!(error_text(&automatic).contains("it runs on the processor"), "{}", error_text(&automatic));
+    assert!(!error_text(&automatic).contains("differs from the processor by 0.0"), "{}", error_text(&automatic));
     let named = masked("openvino");
-    assert!(!named.status.success() && said(&named).contains("comes out otherwise"), "{}", said(&named));
+    assert!(!named.status.success() && error_text(&named).contains("comes out otherwise"), "{}", error_text(&named));
     // What it computes alike is taken.
-    let checked = run(&["bundle", "check", &bundle("mask"), "--json"], &library, home.path());
+    let checked = run(&["bundle", "check", &tiny("mask").display().to_string(), "--json"], &library, home.path());
     assert_eq!(json(&checked)["engines"], serde_json::json!(["rten", "ort", "openvino"]));
     let refused = run(&["bundle", "check", &rounding, "--json"], &library, home.path());
     assert_eq!(json(&refused)["engines"], serde_json::json!(["rten", "ort"]));

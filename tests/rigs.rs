@@ -11,7 +11,7 @@ use touch2touch_pipeline::io::dataset::{Dataset, RIG_JSON};
 use touch2touch_pipeline::io::error::FileErrorKind;
 use touch2touch_pipeline::io::images;
 
-use crate::support::run;
+use crate::support::{run, tiny};
 
 /// A gripper of two fingers, each with a color and a depth sensor.
 fn sound() -> Value {
@@ -224,7 +224,7 @@ fn names_from_files_are_shown_and_never_obeyed() {
         text
     };
     let mut all = String::new();
-    let bundle = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles/digit_to_bubble");
+    let bundle = tiny("digit_to_bubble");
     for args in [
         &["doctor", place][..],
         &["doctor", place, "--json"],

@@ -7,10 +7,11 @@ use touch2touch_core::catalog;
 use touch2touch_core::grid::Mask;
 use touch2touch_core::label::Provenance;
 use touch2touch_core::rig::lab;
-use touch2touch_core::sim;
 use touch2touch_pipeline::io::dataset::Dataset;
-use touch2touch_pipeline::io::simulated::{Layout, write_pair, write_tools};
+use touch2touch_pipeline::io::simulated::{Layout, pair_paths};
 use touch2touch_pipeline::labels::{DrawnMask, Labels, MaskPlace, Operation, PairLabels, Review};
+
+use crate::support::write_grasps;
 
 fn mask(at: usize) -> Mask {
     Mask::from_fn(175, 140, |u, v| (u + 3 * at) % 11 < 4 && v > 20 + at)
@@ -37,12 +38,10 @@ fn files(folder: &Path) -> BTreeSet<PathBuf> {
 fn labels_are_the_same_by_whatever_way_the_data_set_is_opened() {
     let dir = tempfile::tempdir().unwrap();
     let root = dir.path().join("set");
-    let tool = catalog::tools().first().unwrap();
-    let sample = sim::simulate(tool, sim::random_grasp(3), 3, &sim::SimConfig::default());
-    for index in 1..4 {
-        write_pair(&root, Layout::Train, &tool.name, index, &sample).unwrap();
-    }
-    write_tools(&root, &[(tool.name.as_str(), tool.seen, tool.mesh())]).unwrap();
+    write_grasps(&root, Layout::Train, &catalog::tools()[..1], 4);
+    let first_pair = pair_paths(&root, Layout::Train, &catalog::tools()[0].name, 0);
+    let aside = [0, 1].map(|half| dir.path().join(format!("{half}.pt")));
+    first_pair.iter().zip(&aside).for_each(|(file, aside)| std::fs::rename(file, aside).unwrap());
     let dataset = Dataset::open(&root).unwrap();
     let labels = Labels::of(&dataset);
     for (at, pair) in dataset.index.pairs.iter().enumerate() {
@@ -81,7 +80,7 @@ fn labels_are_the_same_by_whatever_way_the_data_set_is_opened() {
         same(&read(&way, false), &way.display().to_string());
     }
     // A pair that sorts before the others moves all of them by one place.
-    write_pair(&root, Layout::Train, &tool.name, 0, &sample).unwrap();
+    first_pair.iter().zip(&aside).for_each(|(file, aside)| std::fs::rename(aside, file).unwrap());
     let grown = read(&root, false);
     assert_eq!(grown.len(), 4);
     same(&grown, "a pair more");

@@ -1,10 +1,9 @@
 //! Sensors are data: the reverse direction, from Soft Bubble to GelSlim, and a gripper that this program never saw.
 
 use std::path::{Path, PathBuf};
-use std::process::Output;
 use std::sync::Arc;
 
-use serde_json::{Value, json};
+use serde_json::{Value, json as value};
 use touch2touch::app::command::{Command, Pane, PredictCommand, ViewCommand};
 use touch2touch::app::keys::{ImprintSource, ShiftMode};
 use touch2touch::app::library::Place;
@@ -24,25 +23,12 @@ use touch2touch_pipeline::io::dataset::{Dataset, RIG_JSON};
 use touch2touch_pipeline::io::images;
 use touch2touch_pipeline::steps::bundles::BundleKind;
 
-use crate::support::run;
-
-fn bundle(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles").join(name)
-}
-
-fn text(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
-
-fn report(output: &Output) -> Value {
-    assert!(output.status.success(), "{}", text(output));
-    serde_json::from_slice(&output.stdout).unwrap()
-}
+use crate::support::{error_text, json, run, simulate, tiny};
 
 /// The studio on a place, with the bundles of a folder beside the shipped ones; waits until `done`.
 fn studio(place: Place, named: &str, home: &Path, mut done: impl FnMut(&State) -> bool) -> State {
     let services = Services::with_config_folder(Some(home.to_owned()));
-    let mut settings = Settings { bundle_folders: vec![bundle("")], ..Settings::default() };
+    let mut settings = Settings { bundle_folders: vec![tiny("")], ..Settings::default() };
     settings.generate.bundle = Some(named.to_owned());
     settings.generate.by_itself = false;
     settings.about_own_data = false;
@@ -68,14 +54,13 @@ fn studio(place: Place, named: &str, home: &Path, mut done: impl FnMut(&State) -
 fn the_reverse_direction_goes_through_every_verb() {
     let dir = tempfile::tempdir().unwrap();
     let (home, set, out) = (dir.path().join("home"), dir.path().join("set"), dir.path().join("out"));
-    let reverse = bundle("bubble_to_gelslim");
+    let reverse = tiny("bubble_to_gelslim");
+    simulate(&set, "pattern_36", &["--grasps", "1", "--seed", "3"]);
     let [set, out, reverse] = [&set, &out, &reverse].map(|p| p.to_str().unwrap());
     assert!(run(&["bundle", "check", reverse], &home).status.success());
-    let made = run(&["simulate", "--out", set, "--tools", "pattern_36", "--grasps", "1", "--seed", "3"], &home);
-    assert!(made.status.success(), "{}", text(&made));
 
     let generate = ["generate", set, "--out", out, "--finger", "both", "--runtime", "rten", "--json"];
-    let found = report(&run(&[&generate[..], &["--bundle", reverse]].concat(), &home));
+    let found = json(&run(&[&generate[..], &["--bundle", reverse]].concat(), &home));
     let pairs = found["pairs"].as_array().unwrap();
     assert_eq!(pairs.len(), 2, "both fingers");
     for pair in pairs {
@@ -88,9 +73,9 @@ fn the_reverse_direction_goes_through_every_verb() {
 
     // What needs depth says so.
     let pose = run(&["pose", set, "--imprint", "predicted", "--bundle", reverse, "--runtime", "rten"], &home);
-    assert!(!pose.status.success() && text(&pose).contains("predicts a color picture"), "{}", text(&pose));
+    assert!(!pose.status.success() && error_text(&pose).contains("predicts a color picture"), "{}", error_text(&pose));
     let args = ["evaluate", set, "--bundle", reverse, "--resamples", "0", "--runtime", "rten", "--json"];
-    let table = report(&run(&[&args[..], &["--mask", "truth"]].concat(), &home));
+    let table = json(&run(&[&args[..], &["--mask", "truth"]].concat(), &home));
     let row = &table["rows"][1]["groups"][0];
     assert!(row["psnr_db"]["value"].as_f64().unwrap() > 0.0 && row["ssim"]["value"].is_number(), "{row}");
     assert!(row["angle_deg"].is_null() && row["frechet"].is_null(), "{row}");
@@ -110,7 +95,7 @@ fn the_studio_shows_a_predicted_color_picture() {
     assert_eq!(picture.size(), lab::GELSLIM.size());
     // The same as the generator itself makes of the imprint.
     let mut generator =
-        Generator::open(&Bundle::open(&bundle("bubble_to_gelslim")).unwrap(), EngineChoice::Auto).unwrap();
+        Generator::open(&Bundle::open(&tiny("bubble_to_gelslim")).unwrap(), EngineChoice::Auto).unwrap();
     let condition = results::touch(&state, lab::RIGHT).ready().unwrap().picture(lab::BUBBLE_ID).unwrap();
     let config = results::chosen(&state, lab::RIGHT).unwrap().config;
     let raw = generator.generate(&condition, &config, &mut |_| std::ops::ControlFlow::Continue(())).unwrap();
@@ -127,7 +112,7 @@ fn the_studio_shows_a_predicted_color_picture() {
 
 /// A gripper of one finger with one DIGIT, and a touch taken with it.
 fn digit_folder(dir: &Path) -> Rig {
-    let rig = json!({
+    let rig = value!({
         "name": "One DIGIT",
         "sensors": [{ "key": "digit", "name": "DIGIT", "kind": "color", "width": 240, "height": 320, "px_per_m": 16_000.0 }],
         "pads": [{ "key": "thumb", "name": "Thumb" }],
@@ -158,28 +143,28 @@ fn a_gripper_of_one_digit_is_opened_and_predicted_for() {
     let touch = sample.pad(thumb).unwrap();
     assert_eq!(touch.color().unwrap().difference[(120, 7)], [60.0, 0.0, -60.0]);
     assert!(touch.depth().is_none() && rig.first(SensorKind::Depth).is_none());
-    let tiny = Bundle::open(&bundle("digit_to_bubble")).unwrap();
-    assert_eq!(tiny.ends(&rig).unwrap(), Ok(Ends { input: rig.sensor_of_key("digit").unwrap(), output: None }));
+    let digit = Bundle::open(&tiny("digit_to_bubble")).unwrap();
+    assert_eq!(digit.ends(&rig).unwrap(), Ok(Ends { input: rig.sensor_of_key("digit").unwrap(), output: None }));
 
-    let [set, out, tiny] = [&set, &out, &bundle("digit_to_bubble")].map(|p| p.to_str().unwrap().to_owned());
+    let [set, out, digit] = [&set, &out, &tiny("digit_to_bubble")].map(|p| p.to_str().unwrap().to_owned());
     let generate = ["generate", &set, "--out", &out, "--runtime", "rten", "--json", "--bundle"];
-    let found = report(&run(&[&generate[..], &[&tiny]].concat(), &home));
+    let found = json(&run(&[&generate[..], &[&digit]].concat(), &home));
     assert_eq!(found["pairs"][0]["finger"], "thumb");
     let depth: Grid<f32> = images::read_gray(&Path::new(&out).join("a_thumb.png")).unwrap();
     assert_eq!(depth.size(), [175, 140]);
     // What follows a folder knows its sensors too.
     let watch = ["watch", &set, "--once", "--runtime", "rten", "--mask", "threshold", "--json", "--out", &out];
-    let watched = run(&[&watch[..], &["--bundle", &tiny]].concat(), &home);
+    let watched = run(&[&watch[..], &["--bundle", &digit]].concat(), &home);
     let said = String::from_utf8_lossy(&watched.stdout);
     let done = said.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
     let done = done.filter(|event| event["event"] == "done").collect::<Vec<_>>();
-    assert_eq!((done.len(), &done[0]["fingers"][0]["finger"]), (1, &json!("thumb")), "{said}{}", text(&watched));
+    assert_eq!((done.len(), &done[0]["fingers"][0]["finger"]), (1, &value!("thumb")), "{said}{}", error_text(&watched));
     // A bundle for other sensors says so, and what would fit; without a name the fitting one is looked for.
-    let lab = bundle("generator");
+    let lab = tiny("generator");
     let refused = run(&[&generate[..], &[lab.to_str().unwrap()]].concat(), &home);
     for part in ["from gelslim (color, 427 x 320)", "sensors of this data are digit (color, 240 x 320)", "names digit"]
     {
-        assert!(text(&refused).contains(part), "{part}: {}", text(&refused));
+        assert!(error_text(&refused).contains(part), "{part}: {}", error_text(&refused));
     }
     // The studio takes the one bundle that fits, though another is named, and shows the prediction.
     let name = "Tiny generator of the tests";

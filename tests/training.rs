@@ -11,12 +11,11 @@ use touch2touch_core::dataset::PairId;
 use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::label::{DrawTool, Drawing, Ground, Paint, Provenance};
 use touch2touch_core::postprocess::ShiftMode;
-use touch2touch_core::sim;
 use touch2touch_pipeline::error::TaskErrorKind;
 use touch2touch_pipeline::export::{DrawnMasks, LeftOut};
 use touch2touch_pipeline::infer::engine::EngineChoice;
 use touch2touch_pipeline::io::dataset::Dataset;
-use touch2touch_pipeline::io::simulated::{Layout, write_pair, write_tools};
+use touch2touch_pipeline::io::simulated::Layout;
 use touch2touch_pipeline::job::{Cancel, JobCx, Progress};
 use touch2touch_pipeline::labels::{DrawnMask, ImprintOf, Labels, MaskPlace, Operation, Review};
 use touch2touch_pipeline::learn::train::{TrainChoice, TrainSetup, Trained, plan, train};
@@ -24,19 +23,11 @@ use touch2touch_pipeline::learn::tuning::Tuning;
 use touch2touch_pipeline::steps::bundles::{self, BundleKind, find};
 use touch2touch_pipeline::steps::models::Models;
 
-use crate::support::{command, run};
+use crate::support::{command, json, run, tiny, write_grasps};
 
 /// Simulated grasps of two tools, all of whose masks were corrected to the truth by a person and marked done.
 pub(crate) fn corrected(root: &Path, grasps: u64) {
-    let tools: Vec<_> = catalog::tools().iter().take(2).collect();
-    for tool in &tools {
-        for index in 0..grasps {
-            let sample = sim::simulate(tool, sim::random_grasp(index + 3), index, &sim::SimConfig::default());
-            write_pair(root, Layout::Train, &tool.name, index, &sample).unwrap();
-        }
-    }
-    let meshes: Vec<_> = tools.iter().map(|t| (t.name.as_str(), t.seen, t.mesh())).collect();
-    write_tools(root, &meshes).unwrap();
+    write_grasps(root, Layout::Train, &catalog::tools()[..2], grasps);
     let dataset = Dataset::open(root).unwrap();
     let labels = Labels::of(&dataset);
     for (at, entry) in dataset.index.pairs.iter().enumerate() {
@@ -101,10 +92,6 @@ fn the_verb_trains_says_what_it_is_worth_and_writes_over_nothing() {
         let fixed = ["masks", "train", set, "--held-out", "30", "--runtime", "rten", "--json", "--no-cache"];
         run(&[&fixed[..], more].concat(), dir.path())
     };
-    let json = |output: &std::process::Output| -> Value {
-        let error = String::from_utf8_lossy(&output.stderr);
-        serde_json::from_slice(&output.stdout).unwrap_or_else(|err| panic!("{err}: {error}"))
-    };
     let planned = json(&verb(&["--dry-run"]));
     assert_eq!(
         (&planned["masks"], &planned["pairs"], &planned["held_out"]["masks"]),
@@ -159,18 +146,16 @@ fn a_run_that_is_stopped_leaves_no_bundle_and_goes_on_to_the_same_last_bit() {
     let whole = go(&dataset, &setup(&dataset, straight.clone(), None), &JobCx::unwatched()).unwrap();
     let kept = dir.path().join("unfinished");
     let resumable = setup(&dataset, stopped.clone(), Some(kept.clone()));
-    for stop_at in [1, 2] {
-        let cancel = Cancel::default();
-        let told = cancel.clone();
-        let watch = move |progress: Progress| {
-            if progress.total == 3 && progress.done >= stop_at {
-                told.cancel();
-            }
-        };
-        let err = go(&dataset, &resumable, &JobCx::new(cancel, Arc::new(watch))).unwrap_err();
-        assert_eq!(err.kind, TaskErrorKind::Cancelled);
-        assert!(!stopped.exists(), "a cancelled run leaves no bundle");
-    }
+    let cancel = Cancel::default();
+    let told = cancel.clone();
+    let watch = move |progress: Progress| {
+        if progress.total == 3 && progress.done >= 2 {
+            told.cancel();
+        }
+    };
+    let err = go(&dataset, &resumable, &JobCx::new(cancel, Arc::new(watch))).unwrap_err();
+    assert_eq!(err.kind, TaskErrorKind::Cancelled);
+    assert!(!stopped.exists(), "a cancelled run leaves no bundle");
     let resumed = go(&dataset, &resumable, &JobCx::unwatched()).unwrap();
     assert_eq!((&resumed.curves, &resumed.held_out), (&whole.curves, &whole.held_out));
     assert!(bytes(&stopped) == bytes(&straight));
@@ -320,7 +305,7 @@ fn what_cannot_be_trained_is_refused_and_says_what_to_do() {
     std::fs::write(&file, "x").unwrap();
     assert!(new(&|setup| setup.out = file.clone()).contains("is a file"));
     // A network that was never trained here.
-    let tiny = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles/mask");
+    let tiny = tiny("mask");
     let other = new(&|setup| setup.start = bundles::open("Open", tiny.as_path()).unwrap());
     assert!(other.contains("architecture"), "{other}");
     review(&dataset, 0, Review::Skip);

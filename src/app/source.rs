@@ -140,9 +140,8 @@ mod tests {
     use touch2touch_core::postprocess::ShiftMode;
     use touch2touch_core::rig::lab;
     use touch2touch_pipeline::export::{DrawnMasks, ExportChoice, ExportSetup, LeftOut, Which, export_masks, plan};
-    use touch2touch_pipeline::io::masks::MaskStore;
     use touch2touch_pipeline::job::JobCx;
-    use touch2touch_pipeline::labels::{DrawnMask, ImprintOf, MaskPlace, Operation, PairLabels, Review, Revision};
+    use touch2touch_pipeline::labels::{DrawnMask, ImprintOf, MaskPlace, PairLabels, Review, Revision};
 
     /// A folder with one pair of pictures.
     fn pictures(folder: &Path) {
@@ -171,49 +170,6 @@ mod tests {
             .into(),
             note: "shallow at the edge".into(),
         }
-    }
-
-    fn same(a: &PairLabels, b: &PairLabels) -> bool {
-        let masks = |l: &PairLabels| {
-            l.masks.iter().map(|(place, h)| (place.clone(), h.mask.clone(), h.base())).collect::<Vec<_>>()
-        };
-        masks(a) == masks(b) && a.review == b.review && a.accepted == b.accepted && a.note == b.note
-    }
-
-    #[test]
-    fn labels_come_back_and_undo_reaches_the_disk() {
-        let folder = tempfile::tempdir().unwrap();
-        pictures(folder.path());
-        let place = Place::Path(folder.path().to_owned());
-        let source = Source::open(&place, None).unwrap();
-        let name = source.dataset.index.pairs[0].name.clone();
-        assert!(source.labels.load(&name).unwrap().is_empty());
-        source.labels.save(&name, &labels(), &Operation::default()).unwrap();
-        let again = Source::open(&place, None).unwrap();
-        assert_eq!(
-            (again.reviews.states[&name], &*again.reviews.notes[&name]),
-            (Review::InProgress, "shallow at the edge")
-        );
-        assert!(same(&again.labels.load(&name).unwrap(), &labels()));
-        again.labels.save(&name, &PairLabels::default(), &Operation::default()).unwrap();
-        assert!(Source::open(&place, None).unwrap().labels.load(&name).unwrap().is_empty());
-    }
-
-    #[test]
-    fn damaged_labels_are_refused_and_left_alone() {
-        let folder = tempfile::tempdir().unwrap();
-        pictures(folder.path());
-        let place = Place::Path(folder.path().to_owned());
-        let source = Source::open(&place, None).unwrap();
-        let name = source.dataset.index.pairs[0].name.clone();
-        source.labels.save(&name, &labels(), &Operation::default()).unwrap();
-        let folder = source.labels.folder().unwrap().to_owned();
-        let file = MaskStore::in_folder(folder).mask_file(&name, lab::RIGHT);
-        std::fs::write(&file, b"{ half a fi").unwrap();
-        let again = Source::open(&place, None).unwrap();
-        assert!(again.labels.load(&name).unwrap_err().hint.is_some());
-        assert!(again.labels.save(&name, &labels(), &Operation::default()).is_err());
-        assert_eq!(std::fs::read(&file).unwrap(), b"{ half a fi");
     }
 
     #[test]

@@ -144,7 +144,7 @@ impl Watch {
         if files::is_done(&stem, &source, &recipe) {
             summary.skipped += 1;
             return output.line(&json!({"event": "skipped", "name": ready.name}), || {
-                format!("{}: was done with the same recipe", ready.name)
+                format!("{}: already done with the same recipe", ready.name)
             });
         }
         let begun = (SystemTime::now(), Instant::now());

@@ -48,22 +48,6 @@ pub(super) fn a_drawing_and_a_clean_up_are_the_same_by_hand_and_by_verb() {
     let [by_hand, by_verb] = [&deeds[..3], &deeds[4..]];
     assert_eq!((by_hand, &deeds[3].0), (by_verb, &"correction removed".into()));
     assert_eq!(by_hand[0].0, "polygon");
-    // The mask of a prediction is another one.
-    let of_prediction = ["--imprint", "predicted", "--steps", "1", "--adopt"];
-    let labeled = json(&[&begun[..], &of_prediction[..]].concat(), home.path());
-    let pair = &labeled["pairs"][0];
-    assert_eq!((pair["masks"].as_array().unwrap().len(), pair["predicted"].as_array().unwrap().len()), (1, 1));
-    assert_eq!(stored(), drawn);
-    let of_it = || {
-        let labels = Labels::of(&Dataset::open(&folder).unwrap()).load(&name).unwrap();
-        labels.masks.into_iter().find(|(place, _)| place.of.source() == ImprintSource::Predicted).unwrap().1.mask
-    };
-    // What is drawn on it then is drawn on the prediction, in the same breath too.
-    let wand = ["--draw", r#"{"tool": "wand", "tolerance_m": 0.0004, "paint": "free", "points": [[87, 70]]}"#];
-    json(&[&begun[..], &of_prediction[..4], &wand[..]].concat(), home.path());
-    let one_by_one = of_it();
-    json(&[&begun[..], &of_prediction[..], &wand[..]].concat(), home.path());
-    assert_eq!(of_it(), one_by_one);
     // Where nobody drew, there is nothing to take away, and nothing has begun.
     let other = name_of(&json(&["pose", path], home.path()), 1);
     let labeled = json(&["label", path, "--pair", &other, "--remove-mask"], home.path());

@@ -73,7 +73,7 @@ pub(super) fn a_random_recipe_gives_the_same_poses_from_python_and_by_the_verb()
     let lab = lab_folder(home.path()).display().to_string();
     let mut draws = Draws::new(29);
     let (mut asked, mut said) = (Vec::new(), Vec::new());
-    for at in 0..6 {
+    for at in 0..4 {
         let path = if at % 2 == 0 { "demo" } else { &lab };
         let recipe = draws.posed();
         let recipe = Recipe { engine: touch2touch_pipeline::infer::engine::EngineChoice::Rten, ..recipe };
@@ -97,7 +97,7 @@ pub(super) fn a_random_recipe_gives_the_same_poses_from_python_and_by_the_verb()
         assert_eq!(row["verdict"], case["verdict"]["grade"], "{asked:?}");
         poses += 1;
     }
-    assert!(poses >= 4, "{poses} poses of {}", said.len());
+    assert!(poses >= 3, "{poses} poses of {}", said.len());
 }
 
 /// Rows of all pairs of a data set, as JSON.
@@ -117,7 +117,7 @@ fn rows_from_python_have_the_figures_of_the_verbs() {
     let Some(python) = support::python() else { return };
     let home = tempfile::tempdir().unwrap();
     let lab = lab_folder(home.path());
-    let bundle = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles/generator");
+    let bundle = support::tiny("generator");
     let done = Command::new(python).args(["-c", ROWS]).arg(&lab).arg(&bundle).output().unwrap();
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
     let rows: Vec<Value> = serde_json::from_slice(&done.stdout).unwrap();

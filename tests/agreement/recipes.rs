@@ -26,11 +26,12 @@ use touch2touch_pipeline::steps::bundles;
 use touch2touch_pipeline::steps::mask::{MaskChoice, MaskSource};
 use touch2touch_pipeline::steps::recipe::{Model, Recipe, Stage};
 
+use crate::support::tiny;
+
 use super::{Studio, json, lab_folder, number, optional, pictures_folder};
 
 fn model(name: &str) -> Model {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles").join(name);
-    bundles::open("test", folder.as_path()).unwrap().into()
+    bundles::open("test", tiny(name).as_path()).unwrap().into()
 }
 
 fn config() -> impl Strategy<Value = GenerateConfig> {
@@ -179,14 +180,14 @@ pub(super) fn a_random_recipe_gives_the_same_numbers_in_the_studio_and_by_the_ve
     for (place, pairs) in [(Place::Demo, 96), (Place::Path(lab), 3), (Place::Path(pictures), 2)] {
         let mut studio = Studio::open(place, home.path());
         let mut count = 0;
-        for at in 0..3 {
+        for at in 0..2 {
             put(&mut studio, &draw());
             studio.predict((at * 31) % pairs);
             count += same(&studio, home.path());
         }
         compared.push(count);
     }
-    assert!(compared.iter().all(|count| *count >= 6), "{compared:?}");
+    assert!(compared.iter().all(|count| *count >= 4), "{compared:?}");
 }
 
 /// A value without the times in it, which no two runs share.
@@ -210,7 +211,7 @@ pub(super) fn a_random_recipe_gives_the_same_results_table_in_the_studio_and_by_
     let mut rows = 0;
     let mut studio = Studio::open(Place::Path(lab), home.path());
     studio.send(EvaluateCommand::Published(false).into());
-    for _ in 0..3 {
+    for _ in 0..2 {
         let mut recipe = recipe().new_tree(&mut runner).unwrap().current().of(ImprintSource::Predicted);
         recipe.generator.get_or_insert_with(|| (model("generator"), GenerateConfig::default()));
         put(&mut studio, &recipe);
@@ -225,7 +226,7 @@ pub(super) fn a_random_recipe_gives_the_same_results_table_in_the_studio_and_by_
         }
         rows += said["rows"].as_array().unwrap().len();
     }
-    assert!(rows >= 6, "{rows}");
+    assert!(rows >= 4, "{rows}");
 }
 
 /// Part of the format: kept results are found by it, also when defaults change.

@@ -26,6 +26,8 @@ use touch2touch_pipeline::labels::{Labels, PairLabels};
 use touch2touch_pipeline::steps::bundles::{self, BundleInfo};
 use touch2touch_pipeline::steps::models::Models;
 
+use crate::support::{mesh, tiny};
+
 /// `[width, height]` of the imprints.
 pub(crate) const IMPRINT_SIZE: [usize; 2] = [lab::BUBBLE.width, lab::BUBBLE.height];
 /// The first pair.
@@ -75,8 +77,8 @@ fn write_data(root: &Path) {
         let (tool, number) = place_of(pair);
         write_pair(root, Layout::Train, tool, number, &Sample { pads: pads.into(), ..simulated.clone() }).unwrap();
     }
-    let (tool, number) = place_of(SIMULATED.0);
-    write_pair(root, Layout::Train, tool, number, &simulated).unwrap();
+    let (name, number) = place_of(SIMULATED.0);
+    write_pair(root, Layout::Train, name, number, &simulated).unwrap();
 }
 
 /// The data set, written once for all benches that are there at a time.
@@ -93,8 +95,7 @@ fn written() -> Arc<TempDir> {
 
 /// The generator and the mask model of the tests.
 pub(crate) fn models() -> Vec<BundleInfo> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles");
-    ["generator", "mask"].map(|name| bundles::open("Test", folder.join(name).as_path()).unwrap()).to_vec()
+    ["generator", "mask"].map(|name| bundles::open("Test", tiny(name).as_path()).unwrap()).to_vec()
 }
 
 /// The folders that a studio works in.
@@ -112,8 +113,8 @@ impl Folders {
         let (data, config) = (folder.path().join("data"), folder.path().join("config"));
         let folders = Self { data, config, written: written(), _folder: folder };
         (0..=SIMULATED.0).for_each(|pair| folders.link(pair));
-        let meshes = ["tool_c", "tool_b", "tool_a"].into_iter().zip(catalog::tools());
-        write_tools(&folders.data, &meshes.map(|(name, tool)| (name, true, tool.mesh())).collect::<Vec<_>>()).unwrap();
+        // What was drawn lies on no CAD model: with one, every opening would look for the model that it was felt of.
+        write_tools(&folders.data, &[(place_of(SIMULATED.0).0, true, mesh(&catalog::tools()[0]))]).unwrap();
         Arc::new(folders)
     }
 
@@ -197,6 +198,12 @@ impl Bench {
     /// One round with one command; jobs wait.
     pub(crate) fn send(&mut self, command: impl Into<Command>) {
         self.runtime.tick(&mut self.state, vec![command.into()]);
+    }
+
+    /// One command and all that follows.
+    pub(crate) fn run(&mut self, command: impl Into<Command>) {
+        self.send(command);
+        self.settle();
     }
 
     /// One round.

@@ -39,8 +39,7 @@ fn a_proposal_at_the_registered_pose_of_a_prediction_that_nobody_made_ends() {
     bench.send(panes(&[Pane::Masks, Pane::Predicted]));
     bench.send(prefer(|s| s.mask.proposal = ProposalSource::CadRegistered));
     bench.send(ViewCommand::SelectImprint(ImprintSource::Predicted));
-    bench.send(ViewCommand::Propose(true));
-    bench.settle();
+    bench.run(ViewCommand::Propose(true));
     // Which imprint is worked on, and so which pose is needed, must not hang on what is predicted for that pose.
     assert!(results::proposes(&bench.state) && results::chosen(&bench.state, RIGHT).is_none());
     assert_eq!(results::worked_on(&bench.state, RIGHT), ImprintSource::Measured);
@@ -51,12 +50,10 @@ fn a_proposal_at_the_registered_pose_of_a_prediction_that_nobody_made_ends() {
 fn the_pair_that_stays_on_screen_is_predicted_by_itself_where_that_costs_little() {
     let mut bench = Bench::open();
     bench.send(panes(&[Pane::Predicted]));
-    bench.send(LibraryCommand::Select(PairId(1)));
-    bench.settle();
+    bench.run(LibraryCommand::Select(PairId(1)));
     assert_eq!(bench.generated(), 0, "switched off");
     let by_itself = |on: bool| prefer(move |s| s.generate.by_itself = on);
-    bench.send(by_itself(true));
-    bench.settle();
+    bench.run(by_itself(true));
     assert_eq!(bench.generated(), 1);
     let key = results::chosen(&bench.state, RIGHT).expect("it is shown").clone();
     assert_eq!(bench.state.results.cost_of(&key), bench.state.results.predictions.get(&key).map(|made| made.seconds));
@@ -69,16 +66,14 @@ fn the_pair_that_stays_on_screen_is_predicted_by_itself_where_that_costs_little(
     assert!(results::chosen(&bench.state, RIGHT).is_some());
     // A pane that shows no prediction asks for none.
     bench.send(panes(&[Pane::Measured]));
-    bench.send(LibraryCommand::Select(PairId(6)));
-    bench.settle();
+    bench.run(LibraryCommand::Select(PairId(6)));
     assert_eq!(bench.generated(), 2);
     // On a machine that takes long for it nobody waits for what was not asked for.
     let slow = Prediction { seconds: 5.0, ..(**bench.state.results.predictions.get(&key).unwrap()).clone() };
     let keys: Vec<_> = bench.state.results.predictions.iter().map(|(key, _)| key.clone()).collect();
     let slow: Vec<_> = keys.into_iter().map(|key| (key, Arc::new(slow.clone()))).collect();
     bench.send(Answer::TaskResult(Ticket(u64::MAX), TaskResult::new(TaskKind::Generate, slow, predict::generated)));
-    bench.send(panes(&[Pane::Predicted]));
-    bench.settle();
+    bench.run(panes(&[Pane::Predicted]));
     assert_eq!(bench.generated(), 2);
     assert!(matches!(
         results::imprint(&bench.state, ImprintSource::Predicted, RIGHT),
@@ -90,16 +85,13 @@ fn the_pair_that_stays_on_screen_is_predicted_by_itself_where_that_costs_little(
 fn a_finger_that_nobody_looks_at_is_not_generated() {
     let mut bench = Bench::open();
     bench.send(LibraryCommand::Select(SIMULATED));
-    bench.send(panes(&[Pane::Predicted, Pane::Generate]));
-    bench.settle();
-    bench.send(PredictCommand::Generate);
-    bench.settle();
+    bench.run(panes(&[Pane::Predicted, Pane::Generate]));
+    bench.run(PredictCommand::Generate);
     assert!(results::chosen(&bench.state, RIGHT).is_some() && results::chosen(&bench.state, LEFT).is_none());
     assert_eq!(bench.generated(), 1);
     // A pane that makes a pose of both wants the other one too, made like the first.
     bench.send(prefer(move |s| s.generate.seed = 5));
-    bench.send(panes(&[Pane::Predicted, Pane::Scene]));
-    bench.settle();
+    bench.run(panes(&[Pane::Predicted, Pane::Scene]));
     let (right, left) =
         (results::chosen(&bench.state, RIGHT).unwrap().clone(), results::chosen(&bench.state, LEFT).unwrap().clone());
     assert_eq!(PredictionKey { touch: left.touch, ..right }, left);
@@ -108,22 +100,19 @@ fn a_finger_that_nobody_looks_at_is_not_generated() {
     // Both on screen are made together, in one call.
     bench.send(panes(&[Pane::Predicted]));
     bench.send(ViewCommand::ShowBothFingers(true));
-    bench.send(PredictCommand::GenerateNewSeed);
-    bench.settle();
+    bench.run(PredictCommand::GenerateNewSeed);
     assert_eq!(bench.generated(), 4);
     // Switched off, only the active one is made.
     let one = GenerateSettings { both_fingers: false, ..bench.state.settings.generate.clone() };
     bench.send(prefer(move |s| s.generate = one.clone()));
-    bench.send(PredictCommand::GenerateNewSeed);
-    bench.settle();
+    bench.run(PredictCommand::GenerateNewSeed);
     assert_eq!(bench.generated(), 5);
 }
 
 #[test]
 fn previews_are_wanted_where_somebody_looks_and_end_with_the_result() {
     let mut bench = Bench::open();
-    bench.send(panes(&[Pane::Measured]));
-    bench.settle();
+    bench.run(panes(&[Pane::Measured]));
     assert!(results::preview_request(&bench.state).touches.is_empty(), "no predicted imprint is on screen");
     bench.send(panes(&[Pane::Predicted]));
     let touch = bench.state.touch_key(RIGHT).unwrap();
@@ -148,19 +137,15 @@ fn previews_are_wanted_where_somebody_looks_and_end_with_the_result() {
 fn what_was_made_before_the_start_is_found_when_its_pair_is_looked_at() {
     let folders = Folders::new();
     let mut bench = Bench::keeping(folders.clone(), models());
-    bench.send(panes(&[Pane::Predicted]));
-    bench.settle();
-    bench.send(PredictCommand::Generate);
-    bench.settle();
+    bench.run(panes(&[Pane::Predicted]));
+    bench.run(PredictCommand::Generate);
     let first = results::chosen(&bench.state, RIGHT).unwrap().clone();
-    bench.send(PredictCommand::GenerateNewSeed);
-    bench.settle();
+    bench.run(PredictCommand::GenerateNewSeed);
     assert_eq!(bench.state.results.made[&first.touch].len(), 2);
 
     let mut again = Bench::keeping(folders, models());
     assert!(again.state.results.looked_up.is_empty(), "no pane shows a prediction");
-    again.send(panes(&[Pane::Predicted]));
-    again.settle();
+    again.run(panes(&[Pane::Predicted]));
     let touch = again.state.touch_key(RIGHT).unwrap();
     assert_eq!(again.state.results.made[&touch].len(), 2);
     // Shown is the one that the settings would make (seed 42), not simply the last.
@@ -168,10 +153,8 @@ fn what_was_made_before_the_start_is_found_when_its_pair_is_looked_at() {
     assert!(results::imprint(&again.state, ImprintSource::Predicted, RIGHT).ready().is_some());
     assert!(again.state.results.predictions.iter().all(|(_, made)| made.kept));
     let looked = again.state.results.looked_up.len();
-    again.send(LibraryCommand::Step(1));
-    again.settle();
-    again.send(LibraryCommand::Step(-1));
-    again.settle();
+    again.run(LibraryCommand::Step(1));
+    again.run(LibraryCommand::Step(-1));
     assert_eq!(again.state.results.looked_up.len(), looked + 1, "each touch is looked up once");
     assert!(again.runtime.waiting(Worker::Files) == 0);
 }
@@ -179,8 +162,7 @@ fn what_was_made_before_the_start_is_found_when_its_pair_is_looked_at() {
 #[test]
 fn presets_follow_the_bundle_and_own_numbers_leave_them() {
     let mut bench = Bench::open();
-    bench.send(panes(&[Pane::Predicted]));
-    bench.settle();
+    bench.run(panes(&[Pane::Predicted]));
     let touch = bench.state.touch_key(RIGHT).unwrap();
     assert_eq!(bench.state.settings.generate.preset, Some(Preset::Default));
     assert_eq!(recipe::prediction(&bench.state, touch).unwrap().config.steps, 6, "what the bundle recommends");

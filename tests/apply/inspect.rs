@@ -21,8 +21,7 @@ fn bench(list: &[Pane]) -> Bench {
     let mut bench = Bench::open();
     bench.send(prefer(|s| s.mask.choice.source = MaskSource::Truth));
     bench.send(LibraryCommand::Select(SIMULATED));
-    bench.send(panes(list));
-    bench.settle();
+    bench.run(panes(list));
     bench
 }
 
@@ -39,8 +38,7 @@ fn nothing_is_recorded_unless_it_is_looked_at() {
     assert!(Action::StepBack.command(&bench.state).is_none(), "there is nothing to step through");
     // The pane of the steps alone records; it needs no pose beside.
     bench.state.results.estimates.clear();
-    bench.send(panes(&[Pane::Steps]));
-    bench.settle();
+    bench.run(panes(&[Pane::Steps]));
     assert_eq!(bench.state.results.runs.len(), 1);
     assert!(results::pose(&bench.state, MEASURED).ready().is_none());
     let inspection = results::inspection(&bench.state).ready().unwrap().clone();
@@ -129,8 +127,7 @@ fn a_start_is_a_run_of_its_own_and_the_pair_resets_it() {
     bench.send(back);
     assert!(results::inspection(&bench.state).ready().is_some_and(|i| i.requested(0) != Some(start)));
     send(&mut bench, InspectCommand::Start(Some(start)));
-    bench.send(LibraryCommand::Select(PairId(0)));
-    bench.settle();
+    bench.run(LibraryCommand::Select(PairId(0)));
     assert_eq!(bench.state.inspect.start, None);
     assert!(results::inspected(&bench.state).is_none(), "the true contact of this pair is not known");
 }

@@ -23,8 +23,7 @@ const MEASURED: ImprintSource = ImprintSource::Measured;
 
 pub(super) fn bench() -> Bench {
     let mut bench = Bench::open();
-    bench.send(panes(&[Pane::Measured, Pane::Masks]));
-    bench.settle();
+    bench.run(panes(&[Pane::Measured, Pane::Masks]));
     bench
 }
 
@@ -49,8 +48,7 @@ fn count(mask: &Mask) -> usize {
 #[test]
 fn a_stroke_starts_from_the_mask_shown_and_is_saved_when_it_ends() {
     let mut bench = bench();
-    bench.send(prefer(|s| s.mask.choice.source = MaskSource::Threshold));
-    bench.settle();
+    bench.run(prefer(|s| s.mask.choice.source = MaskSource::Threshold));
     let automatic = mask(&bench, lab::RIGHT);
     assert_eq!(count(&automatic), 35 + 4, "the ring and the spot");
     begin(&mut bench, lab::RIGHT, [12.0, 2.0]);
@@ -69,18 +67,15 @@ fn a_stroke_starts_from_the_mask_shown_and_is_saved_when_it_ends() {
     assert_eq!(saved.review, Review::InProgress);
     assert!(bench.state.document.unsaved.is_empty());
     // Another automatic source does not touch it; removing it brings that source back.
-    bench.send(prefer(|s| s.mask.choice.source = MaskSource::TopPercent));
-    bench.settle();
+    bench.run(prefer(|s| s.mask.choice.source = MaskSource::TopPercent));
     assert_eq!(mask(&bench, lab::RIGHT), drawn);
-    bench.send(LabelsCommand::ResetMask);
-    bench.settle();
+    bench.run(LabelsCommand::ResetMask);
     assert!(matches!(
         results::mask_in_force(&bench.state, MEASURED, lab::RIGHT).unwrap().version,
         MaskVersion::Auto(_)
     ));
     // Undo changes the file too.
-    bench.send(LabelsCommand::Undo);
-    bench.settle();
+    bench.run(LabelsCommand::Undo);
     let saved = bench.stored(PAIR);
     assert_eq!(*saved.measured(lab::RIGHT).unwrap().mask, drawn);
 }
@@ -112,15 +107,13 @@ fn a_note_typed_during_a_stroke_is_written_without_the_stroke() {
     let mut bench = bench();
     let name = PAIR.to_owned();
     begin(&mut bench, lab::RIGHT, [12.0, 2.0]);
-    bench.send(LabelsCommand::SetNote(name.clone(), "odd edge".into()));
-    bench.settle();
+    bench.run(LabelsCommand::SetNote(name.clone(), "odd edge".into()));
     let stored = |bench: &Bench| bench.stored(PAIR);
     assert_eq!(stored(&bench).note, "odd edge");
     assert!(stored(&bench).masks.is_empty(), "it may still be given up");
     assert!(bench.state.document.finished_labels()[&name].masks.is_empty());
     assert!(bench.state.document.stroke.is_some(), "it goes on");
-    bench.send(LabelsCommand::EndStroke);
-    bench.settle();
+    bench.run(LabelsCommand::EndStroke);
     assert_eq!(*stored(&bench).measured(lab::RIGHT).unwrap().mask, mask(&bench, lab::RIGHT));
     assert_eq!(stored(&bench).note, "odd edge");
 }
@@ -129,8 +122,7 @@ fn a_note_typed_during_a_stroke_is_written_without_the_stroke() {
 fn undo_and_redo_follow_what_is_on_screen() {
     let mut bench = bench();
     let automatic = [mask(&bench, lab::RIGHT), {
-        bench.send(ViewCommand::SelectFinger(lab::LEFT));
-        bench.settle();
+        bench.run(ViewCommand::SelectFinger(lab::LEFT));
         mask(&bench, lab::LEFT)
     }];
     bench.send(ViewCommand::SelectFinger(lab::RIGHT));
@@ -140,12 +132,10 @@ fn undo_and_redo_follow_what_is_on_screen() {
     let second = mask(&bench, lab::RIGHT);
     bench.send(ViewCommand::SelectFinger(lab::LEFT));
     stroke(&mut bench, lab::LEFT, [20.0, 1.0], [21.0, 1.0]);
-    bench.send(LibraryCommand::Select(PairId(1)));
-    bench.settle();
+    bench.run(LibraryCommand::Select(PairId(1)));
     assert!(Action::Undo.command(&bench.state).is_none(), "nothing of pair 1 was changed");
     bench.send(LabelsCommand::Undo);
-    bench.send(LibraryCommand::Select(PairId(0)));
-    bench.settle();
+    bench.run(LibraryCommand::Select(PairId(0)));
     bench.send(LabelsCommand::Undo);
     assert_eq!(mask(&bench, lab::LEFT), automatic[1], "only the left finger is on screen");
     bench.send(ViewCommand::SelectFinger(lab::RIGHT));
@@ -184,8 +174,7 @@ fn labels_that_cannot_be_read_are_never_written() {
     let file = MaskStore::in_folder(bench.folders.data.join(FOLDER)).mask_file(PAIR, lab::RIGHT);
     std::fs::create_dir_all(file.parent().unwrap()).unwrap();
     std::fs::write(&file, "{ half a fi").unwrap();
-    bench.send(panes(&[Pane::Measured]));
-    bench.settle();
+    bench.run(panes(&[Pane::Measured]));
     assert_eq!(bench.errors(), 1);
     assert!(bench.state.document.blocked(PAIR).is_some());
     let automatic = mask(&bench, lab::RIGHT);
@@ -222,8 +211,7 @@ fn a_full_disk_is_said_and_what_was_drawn_is_kept_and_saved_later() {
     assert_eq!(bench.errors(), 1);
     assert!(bench.state.document.unsaved.contains(PAIR));
     bench.fill(false);
-    bench.send(LabelsCommand::Save);
-    bench.settle();
+    bench.run(LabelsCommand::Save);
     assert!(bench.state.document.unsaved.is_empty());
     assert!(bench.stored(PAIR).measured(lab::RIGHT).is_some());
 }
@@ -245,8 +233,7 @@ fn an_answer_to_an_earlier_saving_confirms_nothing_newer() {
 fn moving_on_ends_the_stroke() {
     let mut bench = bench();
     begin(&mut bench, lab::RIGHT, [12.0, 2.0]);
-    bench.send(LibraryCommand::Step(1));
-    bench.settle();
+    bench.run(LibraryCommand::Step(1));
     let saved = bench.stored(PAIR);
     assert!(saved.measured(lab::RIGHT).unwrap().mask[(12, 2)]);
     assert!(bench.state.document.stroke.is_none());
@@ -273,10 +260,8 @@ fn done_goes_to_the_next_unfinished_and_survives_reopening() {
     bench.send(LibraryCommand::DoneAndNext);
     assert_eq!(bench.state.pair_name(), "tool_a/data_1");
     bench.settle();
-    bench.send(LabelsCommand::SetReview(Review::Flagged));
-    bench.settle();
-    bench.send(LibraryCommand::Reload);
-    bench.settle();
+    bench.run(LabelsCommand::SetReview(Review::Flagged));
+    bench.run(LibraryCommand::Reload);
     assert_eq!(bench.state.document.review(PAIR), Review::Done);
     assert_eq!(bench.state.document.review("tool_a/data_1"), Review::Flagged);
     bench.send(LibraryCommand::SetFilter("is:done".into()));
@@ -289,8 +274,7 @@ fn done_goes_to_the_next_unfinished_and_survives_reopening() {
 fn a_mask_belongs_to_one_imprint() {
     let mut bench = Bench::open();
     bench.send(panes(&[Pane::Measured, Pane::Predicted, Pane::Masks]));
-    bench.send(PredictCommand::Generate);
-    bench.settle();
+    bench.run(PredictCommand::Generate);
     let label = |bench: &Bench, source| results::mask_in_force(&bench.state, source, lab::RIGHT).unwrap().label;
     stroke(&mut bench, lab::RIGHT, [12.0, 2.0], [14.0, 2.0]);
     bench.settle();
@@ -306,8 +290,7 @@ fn a_mask_belongs_to_one_imprint() {
     assert!(label(&bench, source).contains("by you"));
     assert_eq!(in_force(&bench, MEASURED), measured);
     // Another prediction has none, and undo does not reach the one that is not on screen.
-    bench.send(PredictCommand::GenerateNewSeed);
-    bench.settle();
+    bench.run(PredictCommand::GenerateNewSeed);
     assert!(!label(&bench, ImprintSource::Predicted).contains("by you"));
     for _ in 0..9 {
         bench.send(LabelsCommand::Undo);
@@ -322,8 +305,7 @@ fn a_mask_belongs_to_one_imprint() {
 #[test]
 fn every_tool_draws_and_undo_takes_it_back() {
     let mut bench = bench();
-    bench.send(prefer(|s| s.mask.choice.source = MaskSource::Threshold));
-    bench.settle();
+    bench.run(prefer(|s| s.mask.choice.source = MaskSource::Threshold));
     let before = mask(&bench, lab::RIGHT);
     for (tool, name) in [
         (MaskTool::Lasso, "lasso"),
@@ -355,8 +337,7 @@ fn every_tool_draws_and_undo_takes_it_back() {
 fn a_polygon_counts_once_it_is_closed() {
     let mut bench = bench();
     bench.send(prefer(|s| s.mask.choice.source = MaskSource::Threshold));
-    bench.send(prefer(|s| s.mask.tool = MaskTool::Polygon));
-    bench.settle();
+    bench.run(prefer(|s| s.mask.tool = MaskTool::Polygon));
     let before = mask(&bench, lab::RIGHT);
     let corners = [[10.0, 8.0], [18.0, 8.0], [18.0, 13.0]];
     let draw = |bench: &mut Bench, count: usize| {
@@ -381,15 +362,13 @@ fn a_polygon_counts_once_it_is_closed() {
     draw(&mut bench, 3);
     bench.send(LibraryCommand::DoneAndNext);
     bench.send(LabelsCommand::SetReview(Review::Done));
-    bench.send(LabelsCommand::Save);
-    bench.settle();
+    bench.run(LabelsCommand::Save);
     assert_eq!((set(&bench), bench.state.selection.pair), (Some(3), Some(PairId(0))));
     assert_eq!(bench.state.document.review(PAIR), Review::Todo);
     assert!(bench.state.log.entries.iter().any(|e| e.text.contains("nothing was marked")));
     bench.send(LibraryCommand::Step(1));
     assert_eq!(last_said(&bench), "The open polygon was dropped");
-    bench.send(LibraryCommand::Step(-1));
-    bench.settle();
+    bench.run(LibraryCommand::Step(-1));
     assert_eq!(mask(&bench, lab::RIGHT), before);
     assert!(bench.stored(PAIR).masks.is_empty());
     // Closed, it is its corners.
@@ -397,8 +376,7 @@ fn a_polygon_counts_once_it_is_closed() {
     bench.send(LabelsCommand::Close);
     let drawn = mask(&bench, lab::RIGHT);
     assert!(drawn.get(17, 9) == Some(&true) && drawn.get(11, 12) == before.get(11, 12), "{drawn:?}");
-    bench.send(LibraryCommand::DoneAndNext);
-    bench.settle();
+    bench.run(LibraryCommand::DoneAndNext);
     let saved = bench.stored(PAIR);
     assert_eq!((saved.review, saved.masks.values().any(|hand| *hand.mask == drawn)), (Review::Done, true));
 }

@@ -61,7 +61,7 @@ fn session(command: impl Strategy<Value = Command>, most: usize) -> impl Strateg
 
 /// Carries a session out, and ends its last stroke. What is on the disk then is what is on the screen.
 fn carry_out(bench: &mut Bench, commands: Vec<(Command, u8)>) -> Result<(), TestCaseError> {
-    bench.send(panes(&[
+    bench.run(panes(&[
         Pane::Browser,
         Pane::Measured,
         Pane::Predicted,
@@ -70,15 +70,13 @@ fn carry_out(bench: &mut Bench, commands: Vec<(Command, u8)>) -> Result<(), Test
         Pane::Metrics,
         Pane::Scene,
     ]));
-    bench.settle();
     for (command, then) in commands.into_iter().filter(|(command, _)| !takes_long(command)) {
         bench.send(command);
         if then == 0 {
             bench.settle();
         }
     }
-    bench.send(LabelsCommand::EndStroke);
-    bench.settle();
+    bench.run(LabelsCommand::EndStroke);
     for (name, masks, review, note) in said(&bench.state.document) {
         let stored = bench.stored(&name);
         prop_assert_eq!(stored.review, review);

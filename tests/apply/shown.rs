@@ -17,6 +17,7 @@ use touch2touch_pipeline::steps::bundles::{self, BundleInfo};
 
 use super::bench::{Bench, Folders, GENERATOR, models};
 use super::panes;
+use crate::support::copy_folder;
 
 const RIGHT: PadId = lab::RIGHT;
 
@@ -112,10 +113,7 @@ fn holds(state: &State, after: &str) {
 /// A second generator beside the first: what it predicts is another recipe.
 fn second(folders: &Folders) -> BundleInfo {
     let (from, to) = (&models()[0], folders.data.with_file_name("fitted"));
-    std::fs::create_dir_all(&to).unwrap();
-    for entry in std::fs::read_dir(from.origin.path()).unwrap().map(|entry| entry.unwrap()) {
-        std::fs::copy(entry.path(), to.join(entry.file_name())).unwrap();
-    }
+    copy_folder(&from.origin.path(), &to);
     let manifest = std::fs::read_to_string(to.join("manifest.json")).unwrap();
     let manifest = manifest.replace(GENERATOR, "fitted").replace("0.0126", "0.0127");
     std::fs::write(to.join("manifest.json"), manifest).unwrap();
@@ -129,8 +127,7 @@ fn on(folders: Arc<Folders>) -> Bench {
 
 fn look(bench: &mut Bench) {
     bench.send(panes(&[Pane::Predicted, Pane::Compare, Pane::Generate]));
-    bench.send(LibraryCommand::Select(PairId(1)));
-    bench.settle();
+    bench.run(LibraryCommand::Select(PairId(1)));
 }
 
 fn bench() -> Bench {
@@ -147,8 +144,7 @@ proptest! {
         let mut bench = bench();
         for (at, one) in list.iter().enumerate() {
             let Some(command) = one.command(&bench.state) else { continue };
-            bench.send(command);
-            bench.settle();
+            bench.run(command);
             holds(&bench.state, &format!("{:?}", &list[..=at]));
         }
     }
@@ -159,8 +155,7 @@ fn another_model_is_predicted_with_at_once_on_this_pair_and_on_those_seen_before
     let mut bench = bench();
     bench.send(with(|g| g.by_itself = true));
     for pair in [2, 3, 1] {
-        bench.send(LibraryCommand::Select(PairId(pair)));
-        bench.settle();
+        bench.run(LibraryCommand::Select(PairId(pair)));
     }
     let model = |bench: &Bench| {
         let shown = results::chosen(&bench.state, RIGHT).expect("a prediction");
@@ -173,21 +168,18 @@ fn another_model_is_predicted_with_at_once_on_this_pair_and_on_those_seen_before
     bench.settle();
     assert_eq!((&*model(&bench), results::outdated(&bench.state, RIGHT)), ("fitted", None));
     // The next pair was predicted with the first model before.
-    bench.send(LibraryCommand::Step(1));
-    bench.settle();
+    bench.run(LibraryCommand::Step(1));
     assert_eq!((&*model(&bench), results::outdated(&bench.state, RIGHT)), ("fitted", None));
     // Back: both are there, and nothing is made again.
     let made = bench.generated();
-    bench.send(Move::Model(0).command(&bench.state).unwrap());
-    bench.settle();
+    bench.run(Move::Model(0).command(&bench.state).unwrap());
     assert_eq!((&*model(&bench), bench.generated()), (GENERATOR, made));
 }
 
 #[test]
 fn a_start_with_another_model_selected_does_not_open_on_the_picture_of_the_first() {
     let mut first = bench();
-    first.send(PredictCommand::Generate);
-    first.settle();
+    first.run(PredictCommand::Generate);
     let mut again = on(first.folders.clone());
     again.send(Move::Model(1).command(&again.state).unwrap());
     look(&mut again);
@@ -195,8 +187,7 @@ fn a_start_with_another_model_selected_does_not_open_on_the_picture_of_the_first
     assert_eq!(results::outdated(&again.state, RIGHT), Some(Why::NotMade), "it is of another model");
     let shown = results::chosen(&again.state, RIGHT).unwrap();
     assert!(again.state.library.made_with(shown).starts_with(GENERATOR));
-    again.send(with(|g| g.by_itself = true));
-    again.settle();
+    again.run(with(|g| g.by_itself = true));
     assert_eq!(results::outdated(&again.state, RIGHT), None);
     let shown = &results::chosen(&again.state, RIGHT).unwrap().bundle;
     assert_eq!(again.state.library.bundle(shown).unwrap().name, "fitted");
@@ -208,8 +199,7 @@ fn what_a_person_picks_stays_until_the_settings_change_and_comes_back_with_them(
     for seed in [42, 41] {
         bench.send(Move::Seed(seed).command(&bench.state).unwrap());
         bench.send(with(|g| g.seed_locked = true));
-        bench.send(PredictCommand::Generate);
-        bench.settle();
+        bench.run(PredictCommand::Generate);
     }
     let touch = bench.state.touch_key(RIGHT).unwrap();
     let first = Arc::new(bench.state.results.made[&touch][0].clone());

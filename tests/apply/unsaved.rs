@@ -74,8 +74,7 @@ fn what_failed_is_tried_again_after_a_while_and_only_then() {
     let folders = Folders::new();
     let services = Services { retry_after: Duration::from_millis(30), ..folders.services(false) };
     let mut bench = Bench::with(folders, services, models());
-    bench.send(panes(&[Pane::Measured, Pane::Masks]));
-    bench.settle();
+    bench.run(panes(&[Pane::Measured, Pane::Masks]));
     assert_eq!(bench.runtime.next_tick(), None, "an idle window sleeps");
     bench.fill(true);
     stroke(&mut bench, lab::RIGHT, [20.0, 1.0], [21.0, 1.0]);
@@ -152,8 +151,7 @@ fn what_is_saved_elsewhere_is_saved_unless_it_changed_meanwhile() {
 fn another_data_set_does_not_cost_what_could_not_be_saved() {
     let mut bench = stuck();
     let another = bench.another();
-    bench.send(LibraryCommand::Open(another));
-    bench.settle();
+    bench.run(LibraryCommand::Open(another));
     assert!(bench.state.document.unsaved.is_empty());
     bench.fill(false);
     assert_eq!(waiting(&bench).recovered.pairs, [PAIR]);

@@ -23,8 +23,7 @@ fn the_pose_follows_the_mask() {
     let mut bench = Bench::open();
     bench.send(panes(&[Pane::Scene, Pane::Measured]));
     bench.send(prefer(|s| s.mask.choice.source = MaskSource::Cad));
-    bench.send(LibraryCommand::Select(SIMULATED));
-    bench.settle();
+    bench.run(LibraryCommand::Select(SIMULATED));
     let pose = results::pose(&bench.state, MEASURED).ready().unwrap().clone();
     // The true contact of both fingers: better than the lab's tightest success limit of 5 degrees.
     assert!(pose.error_rad.unwrap() < 5f64.to_radians(), "{:?}", pose.error_rad);
@@ -45,13 +44,11 @@ fn the_pose_follows_the_mask() {
         matches!(results::pose(&bench.state, MEASURED), Lookup::Stale(_)),
         "the old pose stays until the new one is there"
     );
-    bench.send(LabelsCommand::EndStroke);
-    bench.settle();
+    bench.run(LabelsCommand::EndStroke);
     let after = results::pose(&bench.state, MEASURED).ready().unwrap();
     assert!(after.num_points < pose.num_points);
     // The other registration is another result; the first one is still there.
-    bench.send(prefer(|s| s.registration = Registration::LabIcp));
-    bench.settle();
+    bench.run(prefer(|s| s.registration = Registration::LabIcp));
     let lab = results::pose(&bench.state, MEASURED).ready().unwrap();
     assert!(lab.error_rad.is_some() && lab.report.iterations > 1);
     bench.send(prefer(|s| s.registration = Registration::default()));
@@ -69,20 +66,17 @@ fn a_source_without_camera_says_why_there_is_no_pose() {
     let mut bench = Bench::open();
     let pictures = bench.another();
     bench.send(LibraryCommand::Open(pictures));
-    bench.send(panes(&[Pane::Scene, Pane::Measured]));
-    bench.settle();
+    bench.run(panes(&[Pane::Scene, Pane::Measured]));
     assert!(matches!(results::cloud(&bench.state, MEASURED), Lookup::Absent(Absent::NoCamera)));
     assert!(bench.state.tasks.is_idle());
     for (source, absent) in [(MaskSource::Truth, Absent::NotSimulated), (MaskSource::Cad, Absent::NoTool)] {
-        bench.send(prefer(move |s| s.mask.choice.source = source));
-        bench.settle();
+        bench.run(prefer(move |s| s.mask.choice.source = source));
         match results::mask_in_force(&bench.state, MEASURED, lab::RIGHT) {
             Err(Lookup::Absent(found)) => assert_eq!(found, absent),
             other => panic!("{other:?}"),
         }
     }
-    bench.send(prefer(|s| s.mask.choice.source = MaskSource::Unet));
-    bench.settle();
+    bench.run(prefer(|s| s.mask.choice.source = MaskSource::Unet));
     assert!(results::mask_in_force(&bench.state, MEASURED, lab::RIGHT).is_ok());
 }
 
@@ -91,16 +85,14 @@ fn where_the_mask_model_finds_nothing_depth_decides_and_label_and_log_say_so() {
     let mut bench = Bench::open();
     bench.send(LibraryCommand::Select(SHALLOW));
     bench.send(panes(&[Pane::Measured]));
-    bench.send(prefer(|s| s.mask.choice.source = MaskSource::Unet));
-    bench.settle();
+    bench.run(prefer(|s| s.mask.choice.source = MaskSource::Unet));
     let shown = results::mask_in_force(&bench.state, MEASURED, lab::RIGHT).unwrap();
     assert!(shown.label.starts_with("Depth ") && shown.label.contains("found no contact"), "{}", shown.label);
     assert!(shown.mask.as_slice().contains(&true));
     let said = |bench: &Bench| bench.state.log.entries.iter().filter(|e| e.text.contains("found no contact")).count();
     assert_eq!(said(&bench), 1, "{:#?}", bench.state.log.entries);
     // The other finger says so when it is looked at, and a source that finds contact says nothing.
-    bench.send(prefer(|s| s.mask.choice.source = MaskSource::Threshold));
-    bench.settle();
+    bench.run(prefer(|s| s.mask.choice.source = MaskSource::Threshold));
     assert_eq!(results::mask_in_force(&bench.state, MEASURED, lab::RIGHT).unwrap().label, "Threshold 5.00 mm");
     assert_eq!(said(&bench), 1);
 }
@@ -110,8 +102,7 @@ fn without_models_the_rest_works_and_a_notice_says_what_to_do() {
     let folders = Folders::new();
     let services = folders.services(false);
     let mut bench = Bench::with(folders, services, Vec::new());
-    bench.send(panes(&[Pane::Measured, Pane::Predicted]));
-    bench.settle();
+    bench.run(panes(&[Pane::Measured, Pane::Predicted]));
     assert!(bench.state.log.entries.iter().any(|e| e.text.contains("No generator") && e.hint.is_some()));
     assert!(Action::Generate.command(&bench.state).is_none());
     bench.send(PredictCommand::Generate);
@@ -154,13 +145,11 @@ fn threads_give_the_same_and_wake_the_window() {
 #[test]
 fn colors_stay_from_pair_to_pair() {
     let mut bench = Bench::open();
-    bench.send(panes(&[Pane::Measured]));
-    bench.settle();
+    bench.run(panes(&[Pane::Measured]));
     let ranges = |bench: &mut Bench| {
         let mut seen = Vec::new();
         for pair in [0, 1, 0] {
-            bench.send(LibraryCommand::Select(PairId(pair)));
-            bench.settle();
+            bench.run(LibraryCommand::Select(PairId(pair)));
             seen.push(bench.state.settings.range);
         }
         seen

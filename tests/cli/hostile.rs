@@ -61,10 +61,10 @@ fn a_simulation_never_mixes_with_another_dataset_and_says_that_it_was_cut_short(
     cut["parts"]["test"]["finished"] = false.into();
     std::fs::write(&manifest, cut.to_string()).unwrap();
     let set_text = set.to_str().unwrap();
-    let doctor = json(&run(&["doctor", set_text, "--json"], dir.path())).to_string();
+    let doctor = json(&run(&["doctor", set_text, "--no-predictions", "--json"], dir.path())).to_string();
     assert!(doctor.contains("was not finished"), "{doctor}");
     assert!(simulate(&set, &["--grasps", "2", "--seed", "7"]).status.success(), "it can be taken up again");
-    let doctor = json(&run(&["doctor", set_text, "--json"], dir.path())).to_string();
+    let doctor = json(&run(&["doctor", set_text, "--no-predictions", "--json"], dir.path())).to_string();
     assert!(!doctor.contains("was not finished"), "{doctor}");
 }
 
@@ -86,7 +86,7 @@ fn a_closed_or_full_standard_output_is_no_panic() {
             .spawn()
             .unwrap()
     };
-    for args in [&["doctor", set, "--json"][..], &["--help"], &["pose", "--help"]] {
+    for args in [&["doctor", set, "--no-predictions", "--json"][..], &["--help"], &["pose", "--help"]] {
         let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
         let full = start(args, full.into()).wait_with_output().unwrap();
         assert_eq!(full.status.code(), Some(2), "{args:?}: {}", error_text(&full));

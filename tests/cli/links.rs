@@ -1,4 +1,4 @@
-//! Every link and anchor of the pages leads somewhere, and every file of docs is reached from its index.
+//! Every link and anchor of the pages leads somewhere.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Component, Path, PathBuf};
@@ -77,33 +77,4 @@ fn every_link_of_the_pages_leads_somewhere() {
     }
     assert!(wrong.is_empty(), "links that lead nowhere:\n{}", wrong.join("\n"));
     assert!(followed >= 80, "{followed} links: were the pages read?");
-}
-
-#[test]
-fn every_file_of_docs_is_reached_from_its_index() {
-    let texts: BTreeMap<String, String> = pages::all().into_iter().collect();
-    let index = Path::new("docs").join("README.md");
-    let links_of = |file: &Path| {
-        let page = file.to_string_lossy().into_owned();
-        texts.get(&page).map(|text| links(&page, text)).unwrap_or_default()
-    };
-    let listed: BTreeSet<PathBuf> = links_of(&index).into_iter().map(|link| link.file).collect();
-    for page in texts.keys().map(PathBuf::from).filter(|page| *page != index) {
-        assert!(listed.contains(&page), "{} has no line for {}", index.display(), page.display());
-    }
-    let mut reached = listed;
-    let mut unread: Vec<PathBuf> = reached.iter().cloned().collect();
-    while let Some(file) = unread.pop() {
-        for link in links_of(&file) {
-            if reached.insert(link.file.clone()) {
-                unread.push(link.file);
-            }
-        }
-    }
-    reached.insert(index);
-    let files = std::fs::read_dir(repository().join("docs")).unwrap();
-    let files = files.map(|entry| Path::new("docs").join(entry.unwrap().file_name()));
-    let lost: Vec<String> =
-        files.filter(|file| !reached.contains(file)).map(|file| file.display().to_string()).collect();
-    assert!(lost.is_empty(), "no page leads to {}", lost.join(", "));
 }

@@ -3,15 +3,14 @@
 use touch2touch_pipeline::io::dataset::Dataset;
 use touch2touch_pipeline::io::masks::MaskStore;
 
-use super::{error_text, json, run};
+use super::{error_text, json, run, simulate};
 
 #[test]
 fn notes_are_written_listed_and_removed() {
     let dir = tempfile::tempdir().unwrap();
     let set = dir.path().join("set");
     let path = set.to_str().unwrap();
-    let simulate = ["simulate", "--out", path, "--tools", "pattern_36", "--grasps", "1", "--seed", "4"];
-    assert!(run(&simulate, dir.path()).status.success());
+    simulate(&set, "pattern_36", &["--grasps", "1", "--seed", "4"]);
     let name = Dataset::open(&set).unwrap().index.pairs[0].name.clone();
     let note = |text: &str| run(&["label", path, "--pair", &name, "--note", text, "--json"], dir.path());
     let written = note(" shallow\n at the edge ");

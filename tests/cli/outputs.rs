@@ -6,14 +6,13 @@ use serde_json::Value;
 use touch2touch_pipeline::io::dataset::Dataset;
 use touch2touch_pipeline::io::names;
 
-use super::{error_text, json, run};
+use super::{error_text, json, run, simulate};
 use crate::cli_generate::full_size_bundle;
 
 /// A dataset of the pairs `a/b` and `a__b`, with both halves each.
 fn look_alike(dir: &Path) -> PathBuf {
     let made = dir.join("made");
-    let args = ["simulate", "--out", made.to_str().unwrap(), "--tools", "pattern_36", "--grasps", "2", "--seed", "3"];
-    assert!(run(&args, dir).status.success());
+    simulate(&made, "pattern_36", &["--grasps", "2", "--seed", "3"]);
     let set = dir.join("set");
     for sensor in ["gelslims", "bubbles"] {
         let from = |i: u8| made.join(format!("test/test_only/{sensor}/pattern_36_data_{i}.pt"));

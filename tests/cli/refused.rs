@@ -3,20 +3,13 @@
 use std::path::Path;
 use std::process::Command;
 
-use super::{error_text, json, run};
-
-/// A small simulated data set.
-fn simulate(out: &Path) {
-    let args = ["simulate", "--out", out.to_str().unwrap(), "--tools", "pattern_36", "--grasps", "2", "--seed", "7"];
-    let made = run(&args, out.parent().unwrap());
-    assert!(made.status.success(), "{}", error_text(&made));
-}
+use super::{error_text, json, run, simulate};
 
 #[test]
 fn arguments_of_label_that_do_nothing_are_errors() {
     let dir = tempfile::tempdir().unwrap();
     let set = dir.path().join("set");
-    simulate(&set);
+    simulate(&set, "pattern_36", &["--grasps", "2", "--seed", "7"]);
     let label = |args: &[&str]| {
         let all = [&["label", set.to_str().unwrap(), "--pair", "data_0"], args].concat();
         run(&all, dir.path())
@@ -49,7 +42,7 @@ fn arguments_of_label_that_do_nothing_are_errors() {
 fn what_is_no_file_among_labels_and_masks_is_said() {
     let dir = tempfile::tempdir().unwrap();
     let set = dir.path().join("set");
-    simulate(&set);
+    simulate(&set, "pattern_36", &["--grasps", "2", "--seed", "7"]);
     let set = set.to_str().unwrap();
     let pipe = |at: &Path| assert!(Command::new("mkfifo").arg(at).status().unwrap().success());
     let done = run(&["label", set, "--pair", "data_0", "--adopt", "--review", "done"], dir.path());

@@ -5,7 +5,7 @@ use std::path::Path;
 use touch2touch_pipeline::io::stl;
 
 use super::{error_text, json};
-use crate::support::run;
+use crate::support::{run, simulate};
 
 /// Makes a CAD model larger, as if it were in a smaller unit.
 fn scale(file: &Path, by: f64) {
@@ -19,8 +19,7 @@ fn a_model_in_millimeters_is_said_and_accepted_for_good() {
     let dir = tempfile::tempdir().unwrap();
     let set = dir.path().join("set");
     let path = set.to_str().unwrap();
-    let made = ["simulate", "--out", path, "--tools", "pattern_36,pattern_31_rod", "--grasps", "1"];
-    assert!(run(&made, dir.path()).status.success());
+    simulate(&set, "pattern_36,pattern_31_rod", &["--grasps", "1"]);
     let folder = set.join("tools_stls");
     let [own, other] = ["pattern_36", "pattern_31_rod"];
     let said = || std::fs::read_to_string(folder.join("unit.txt")).ok();

@@ -9,16 +9,12 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 use touch2touch_pipeline::io::npz;
 
-use super::{error_text, run};
+use super::{error_text, run, simulate};
 
 /// Two simulated grasps in the lab's layout; returns the folder of the set and its two GelSlim files.
 fn set(dir: &Path) -> (PathBuf, Vec<PathBuf>) {
     let set = dir.join("set");
-    let made = run(
-        &["simulate", "--out", set.to_str().unwrap(), "--tools", "pattern_36", "--grasps", "3", "--seed", "5"],
-        dir,
-    );
-    assert!(made.status.success(), "{}", error_text(&made));
+    simulate(&set, "pattern_36", &["--grasps", "3", "--seed", "5"]);
     let mut files = Vec::new();
     let mut folders = vec![set.clone()];
     while let Some(folder) = folders.pop() {

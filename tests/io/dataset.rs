@@ -204,7 +204,7 @@ fn a_number_of_numpy_costs_the_true_pose_alone_and_three_digits_are_said() {
     std::fs::write(&bubble, with_pickle(&whole, key, &[key.as_slice(), numpy].concat())).unwrap();
     let sample = Dataset::open(dir.path()).unwrap().load(PairId(0)).unwrap();
     let [note] = &sample.notes[..] else { panic!("{:?}", sample.notes) };
-    assert!(note.what.contains("numpy") && note.what.contains("this file says no true pose"), "{}", note.what);
+    assert!(note.what.contains("numpy") && note.what.contains("this file has no true pose"), "{}", note.what);
     assert!(note.hint.contains("torch.as_tensor"), "{}", note.hint);
     // The other half of the pair says it as well.
     assert!(sample.grasp_from_object.is_some() && sample.pad(lab::RIGHT).unwrap().depth().is_some());

@@ -20,14 +20,12 @@ fn the_model_is_fitted_by_a_click_scored_and_used() {
     rig.send(prefer(|s| s.hint_dismissed = true));
     rig.send(prefer(|s| s.workspace = Workspace::Evaluate));
     rig.send(ViewCommand::Ui(UiRequest::ShowPane(Pane::Adapt)));
-    rig.shoot("fit-before");
-    let shipped = recipe::bundle(rig.harness.state().state(), BundleKind::Generator).unwrap().clone();
-    assert!(!shipped.is_fitted() && learn::made(rig.harness.state().state(), Network::Generator).is_none());
+    let shipped = recipe::bundle(rig.state(), BundleKind::Generator).unwrap().clone();
+    assert!(!shipped.is_fitted() && learn::made(rig.state(), Network::Generator).is_none());
 
-    rig.harness.get_all_by_label("Fit to my pairs").next().unwrap().click();
-    rig.harness.step();
+    rig.click("Fit to my pairs");
     rig.settle();
-    let found = rig.harness.state().state().learn.adapted.clone().expect("the fit is there");
+    let found = rig.state().learn.adapted.clone().expect("the fit is there");
     assert_eq!((found.pairs, found.touches, found.pads.len()), (6, 12, 2), "{found:?}");
     let closed = found.closed_form.as_ref().unwrap();
     assert!(closed.angle.is_some() && closed.psnr_db.unwrap() > 20.0, "{found:?}");
@@ -36,24 +34,21 @@ fn the_model_is_fitted_by_a_click_scored_and_used() {
     // What was simulated lies near where the model expects it.
     assert!(found.pads.iter().all(|pad| pad.offset_px.iter().all(|off| off.abs() < 6.0)), "{:?}", found.pads);
     // A touch that was left out, before and after.
-    let held = learn::held_back(rig.harness.state().state()).cloned().unwrap();
+    let held = learn::held_back(rig.state()).cloned().unwrap();
     assert!(held.before.size() == held.measured.size() && held.before != held.after, "{}", held.name);
     rig.harness.get_all_by_label("Fitted").next().expect("the picture of the fit");
-    rig.shoot("fit-after");
     // Fitted, but not taken yet.
-    assert_eq!(recipe::bundle(rig.harness.state().state(), BundleKind::Generator).unwrap().id, shipped.id);
-    rig.harness.get_by_label("Use the fitted model").click();
-    rig.harness.step();
+    assert_eq!(recipe::bundle(rig.state(), BundleKind::Generator).unwrap().id, shipped.id);
+    rig.click("Use the fitted model");
     rig.settle();
-    let state = rig.harness.state().state();
+    let state = rig.state();
     let now = recipe::bundle(state, BundleKind::Generator).unwrap();
     assert!(
         now.is_fitted()
             && now.name.contains("fitted to")
             && Some(now.id.as_ref()) == learn::made(state, Network::Generator).map(|f| &*f.id)
     );
-    rig.shoot("fit-used");
     // It is made again from what it was made from.
-    let setup = learn::adapt_setup(rig.harness.state().state()).unwrap();
+    let setup = learn::adapt_setup(rig.state()).unwrap();
     assert_eq!((setup.recipe.generating().unwrap().bundle.id.clone(), setup.pairs.len()), (shipped.id, 6));
 }

@@ -19,22 +19,20 @@ fn a_pane_that_has_nothing_to_show_leaves_its_room() {
     let pairs = folder.path().join("pairs");
     crate::recovery::pictures(&pairs);
     let Some(mut rig) = Rig::live(SIZE, Place::Path(pairs)) else { return };
-    rig.send(prefer(|s| s.hint_dismissed = true));
     let wide = |rig: &Rig| rig.harness.state().places()[&Pane::Compare].width();
-    assert!(!rig.harness.state().state().selection.panes.contains(&Pane::Scene));
+    assert!(!rig.state().selection.panes.contains(&Pane::Scene));
     let alone = wide(&rig);
-    let layout = rig.harness.state().state().settings.layouts.clone();
+    let layout = rig.state().settings.layouts.clone();
     rig.send(LibraryCommand::Open(Place::Demo));
-    assert!(rig.harness.state().state().selection.panes.contains(&Pane::Scene));
+    assert!(rig.state().selection.panes.contains(&Pane::Scene));
     assert!(wide(&rig) < 0.7 * alone, "{} of {alone}", wide(&rig));
-    assert_eq!(rig.harness.state().state().settings.layouts, layout, "what a person arranged is not touched");
+    assert_eq!(rig.state().settings.layouts, layout, "what a person arranged is not touched");
 }
 
 /// Nothing below the tools moves when one is chosen, a mask is changed or a proposal is shown.
 #[test]
 fn nothing_in_the_mask_pane_moves_under_the_pointer() {
-    let Some(mut rig) = Rig::new(SIZE, 2) else { return };
-    rig.send(prefer(|s| s.hint_dismissed = true));
+    let Some(mut rig) = Rig::new(SIZE, 1) else { return };
     rig.send(prefer(|s| s.workspace = Workspace::Label));
     let place = |rig: &Rig| ["Done and next", "Mask source", "Note"].map(|name| rig.harness.get_by_label(name).rect());
     let before = place(&rig);

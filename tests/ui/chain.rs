@@ -13,10 +13,9 @@ const SIZE: [f32; 2] = [1280.0, 800.0];
 #[test]
 fn a_refit_is_computed_used_kept_and_refused_by_another_model() {
     let Some(mut rig) = Rig::new(SIZE, 2) else { return };
-    rig.send(prefer(|s| s.hint_dismissed = true));
     rig.send(PredictCommand::Generate);
     rig.send(PredictCommand::Refit);
-    let state = rig.harness.state().state();
+    let state = rig.state();
     let ShiftMode::Refit(refit) = state.settings.shift else { panic!("{:?}", state.settings.shift) };
     assert!(state.log.entries.iter().any(|e| e.text.contains("Shift statistics of 8 touches")), "{:?}", state.log);
     let kept = std::fs::read_dir(rig.config.join("statistics")).unwrap().count();
@@ -27,5 +26,5 @@ fn a_refit_is_computed_used_kept_and_refused_by_another_model() {
     // It is a choice like the others from now on, and survives a restart.
     rig.send(prefer(|s| s.shift = ShiftMode::Raw));
     rig.restart(SIZE);
-    assert_eq!(rig.harness.state().state().settings.refit, Some(refit));
+    assert_eq!(rig.state().settings.refit, Some(refit));
 }

@@ -8,28 +8,10 @@ use touch2touch::app::keys::{ImprintKey, ImprintSource, ShiftMode};
 use touch2touch::app::results;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{CompareChoice, CompareMode, Workspace};
-use touch2touch::app::state::State;
 use touch2touch_core::rig::lab;
 use touch2touch_pipeline::compare::subject::Subject;
 
 use super::rig::Rig;
-
-fn state(rig: &Rig) -> &State {
-    rig.harness.state().state()
-}
-
-fn click(rig: &mut Rig, label: &str) {
-    let node = rig.harness.get_all_by_label(label).next().unwrap_or_else(|| panic!("no {label:?} on screen"));
-    node.click();
-    rig.harness.step();
-    rig.settle();
-}
-
-fn press(rig: &mut Rig, modifiers: Modifiers, key: Key) {
-    rig.harness.key_press_modifiers(modifiers, key);
-    rig.harness.step();
-    rig.settle();
-}
 
 /// The pixels of a part of the screen.
 fn pixels(rig: &mut Rig, rect: Rect) -> Vec<[u8; 4]> {
@@ -50,52 +32,48 @@ fn set(rig: &mut Rig, a: &str, b: &str, mode: CompareMode) {
 
 #[test]
 fn any_two_imprints_are_compared_where_somebody_looks() {
-    let Some(mut rig) = Rig::new([1280.0, 800.0], 2) else { return };
-    rig.send(prefer(|s| s.hint_dismissed = true));
+    let Some(mut rig) = Rig::new([1280.0, 800.0], 1) else { return };
     rig.send(PredictCommand::Generate);
     // Behind a pane that fills the window nothing is made of what is wished there.
     rig.fill("Predicted imprint");
     set(&mut rig, "prediction:seed=7", "measured", CompareMode::Side);
-    let made = |rig: &Rig| state(rig).results.made.values().map(Vec::len).sum::<usize>();
-    assert!(!state(&rig).selection.panes.contains(&Pane::Compare));
+    let made = |rig: &Rig| rig.state().results.made.values().map(Vec::len).sum::<usize>();
+    assert!(!rig.state().selection.panes.contains(&Pane::Compare));
     assert_eq!(made(&rig), 2, "one for each finger");
-    let chosen = results::chosen(state(&rig), lab::RIGHT).cloned();
+    let chosen = results::chosen(rig.state(), lab::RIGHT).cloned();
 
-    click(&mut rig, "Back to all panes");
+    rig.click("Back to all panes");
     let (a, b) = (subject("prediction:seed=7"), Subject::Measured);
     assert_eq!(made(&rig), 4, "the wished ones, of both fingers: they make one pose");
-    assert_eq!(results::chosen(state(&rig), lab::RIGHT).cloned(), chosen, "what the other panes show stays");
-    let found = results::subjects_compared(state(&rig), &a, &b, lab::RIGHT).ready().expect("the figures");
-    let key = results::subject_key(state(&rig), &a, lab::RIGHT).unwrap();
+    assert_eq!(results::chosen(rig.state(), lab::RIGHT).cloned(), chosen, "what the other panes show stays");
+    let found = results::subjects_compared(rig.state(), &a, &b, lab::RIGHT).ready().expect("the figures");
+    let key = results::subject_key(rig.state(), &a, lab::RIGHT).unwrap();
     let ImprintKey::Predicted(recipe, ShiftMode::ExactInverse) = &key else { panic!("{key:?}") };
     assert_eq!(recipe.config.seed, 7);
-    let measured = results::imprint(state(&rig), ImprintSource::Measured, lab::RIGHT).ready().unwrap();
-    let predicted = results::subject(state(&rig), &a, lab::RIGHT).ready().unwrap();
+    let measured = results::imprint(rig.state(), ImprintSource::Measured, lab::RIGHT).ready().unwrap();
+    let predicted = results::subject(rig.state(), &a, lab::RIGHT).ready().unwrap();
     assert_eq!(found.error[(60, 70)], predicted[(60, 70)] - measured[(60, 70)]);
-    assert!(results::subject_pose(state(&rig), &a).is_some() && results::subject_pose(state(&rig), &b).is_some());
-    rig.shoot("compare-side");
+    assert!(results::subject_pose(rig.state(), &a).is_some() && results::subject_pose(rig.state(), &b).is_some());
 
     // The prediction on screen against the measurement is what the metrics say.
     set(&mut rig, "prediction", "measured", CompareMode::Difference);
-    let state_now = state(&rig);
+    let state_now = rig.state();
     let compared = results::subjects_compared(state_now, &Subject::shown(), &b, lab::RIGHT).ready().unwrap();
     let error = results::comparison(state_now, lab::RIGHT).ready().unwrap();
     assert_eq!((compared.psnr_db, compared.ssim, compared.mae_m), (error.psnr_db, error.ssim, error.mae_m));
     let at = (60, 70);
     let before = compared.error[at];
-    rig.shoot("compare-difference");
 
     // Swapped, the sign changes and nothing else.
-    press(&mut rig, Modifiers::SHIFT, Key::R);
-    let after = results::subjects_compared(state(&rig), &b, &Subject::shown(), lab::RIGHT).ready().unwrap().error[at];
+    rig.key(Modifiers::SHIFT, Key::R);
+    let after = results::subjects_compared(rig.state(), &b, &Subject::shown(), lab::RIGHT).ready().unwrap().error[at];
     assert_eq!(after, -before);
-    assert_eq!(state(&rig).settings.compared().b, Subject::shown());
+    assert_eq!(rig.state().settings.compared().b, Subject::shown());
 }
 
 #[test]
 fn a_key_flickers_and_both_values_are_read() {
     let Some(mut rig) = Rig::new([1280.0, 800.0], 1) else { return };
-    rig.send(prefer(|s| s.hint_dismissed = true));
     rig.send(PredictCommand::Generate);
     set(&mut rig, "prediction", "measured", CompareMode::Side);
     // Large pictures: half a pixel beside is little of them.
@@ -127,22 +105,21 @@ fn a_key_flickers_and_both_values_are_read() {
     let read = rig.harness.get_all_by_label_contains("A minus B ").count();
     assert!(read > 0, "both values and their difference");
 
-    press(&mut rig, Modifiers::SHIFT, Key::F);
-    assert_eq!(state(&rig).settings.compared().mode, CompareMode::Difference);
+    rig.key(Modifiers::SHIFT, Key::F);
+    assert_eq!(rig.state().settings.compared().mode, CompareMode::Difference);
 }
 
 #[test]
 fn the_choice_is_kept_per_workspace_and_what_is_not_there_says_so() {
     let Some(mut rig) = Rig::new([1280.0, 800.0], 1) else { return };
-    rig.send(prefer(|s| s.hint_dismissed = true));
     rig.send(PredictCommand::Generate);
     set(&mut rig, "mean:seeds=2", "measured", CompareMode::Side);
     rig.send(prefer(|s| s.workspace = Workspace::Align));
-    assert_eq!(state(&rig).settings.compared(), CompareChoice::default());
+    assert_eq!(rig.state().settings.compared(), CompareChoice::default());
     rig.send(prefer(|s| s.workspace = Workspace::Inspect));
     rig.restart([1280.0, 800.0]);
-    assert_eq!(state(&rig).settings.compared().a, subject("mean:seeds=2"), "kept in the preferences");
-    assert!(Action::SwapCompared.command(state(&rig)).is_some());
+    assert_eq!(rig.state().settings.compared().a, subject("mean:seeds=2"), "kept in the preferences");
+    assert!(Action::SwapCompared.command(rig.state()).is_some());
     set(&mut rig, "stored", "prediction:bundle=gone", CompareMode::Side);
     assert!(rig.harness.query_all_by_label_contains("is gone; choose another").next().is_some());
 }

@@ -6,7 +6,6 @@ use touch2touch::app::command::{Command, LibraryCommand, Pane, SettingsCommand, 
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::settings::Workspace;
 use touch2touch::app::settings::prefer;
-use touch2touch::app::state::State;
 use touch2touch_core::rig::lab;
 
 use super::rig::Rig;
@@ -14,23 +13,18 @@ use super::rig::Rig;
 const SIZE: [f32; 2] = [1280.0, 800.0];
 const MEASURED: ImprintSource = ImprintSource::Measured;
 
-fn state(rig: &Rig) -> &State {
-    rig.harness.state().state()
-}
-
 /// Notes that go by themselves are gone, and the panes are as high as they stay.
 fn quiet(rig: &mut Rig) {
-    for _ in 0..60 {
+    for _ in 0..20 {
         rig.harness.step();
     }
 }
 
 #[test]
 fn a_restart_brings_back_pair_finger_camera_and_the_large_pane() {
-    let Some(mut rig) = Rig::new(SIZE, 3) else { return };
-    rig.send(prefer(|s| s.hint_dismissed = true));
+    let Some(mut rig) = Rig::new(SIZE, 1) else { return };
     rig.send(prefer(|s| s.workspace = Workspace::Align));
-    rig.send(LibraryCommand::Step(4));
+    rig.send(LibraryCommand::Step(1));
     rig.send(ViewCommand::SelectFinger(lab::LEFT));
     rig.send(ViewCommand::ShowBothFingers(false));
     quiet(&mut rig);
@@ -42,7 +36,7 @@ fn a_restart_brings_back_pair_finger_camera_and_the_large_pane() {
     rig.harness.step();
     rig.harness.drop_at(center + vec2(140.0, 30.0));
     rig.settle();
-    let pair = state(&rig).pair_name().to_owned();
+    let pair = rig.state().pair_name().to_owned();
     let turned = rig.harness.state().on_screen(MEASURED, [0.0, 0.01, 0.01]).unwrap();
     rig.harness.state_mut().remember();
     rig.harness.step();
@@ -50,9 +44,9 @@ fn a_restart_brings_back_pair_finger_camera_and_the_large_pane() {
 
     rig.restart(SIZE);
     quiet(&mut rig);
-    assert_eq!(state(&rig).pair_name(), pair);
-    assert_eq!(state(&rig).selection.finger, lab::LEFT);
-    assert!(!state(&rig).selection.both_fingers);
+    assert_eq!(rig.state().pair_name(), pair);
+    assert_eq!(rig.state().selection.finger, lab::LEFT);
+    assert!(!rig.state().selection.both_fingers);
     let again = rig.harness.state().on_screen(MEASURED, [0.0, 0.01, 0.01]).unwrap();
     assert!((again - turned).length() < 1.0, "{turned:?} {again:?}");
 
@@ -68,8 +62,8 @@ fn a_restart_brings_back_pair_finger_camera_and_the_large_pane() {
     rig.settle();
     rig.restart(SIZE);
     assert!(large(&rig) > 1000.0, "{}", large(&rig));
-    assert_eq!(state(&rig).selection.panes.iter().copied().collect::<Vec<_>>(), [Pane::Scene]);
+    assert_eq!(rig.state().selection.panes.iter().copied().collect::<Vec<_>>(), [Pane::Scene]);
     rig.send(SettingsCommand::ResetSettings);
     rig.restart(SIZE);
-    assert_ne!(state(&rig).pair_name(), pair);
+    assert_ne!(rig.state().pair_name(), pair);
 }

@@ -18,25 +18,21 @@ use super::rig::Rig;
 fn what_arrives_in_a_followed_folder_is_shown_predicted_and_posed() {
     let Some(mut rig) = Rig::new([1280.0, 800.0], 2) else { return };
     rig.send(prefer(|s| s.workspace = Workspace::Align));
-    let names = |rig: &Rig| -> Vec<String> {
-        rig.harness.state().state().library.pairs().iter().map(|p| p.name.clone()).collect()
-    };
+    let names = |rig: &Rig| -> Vec<String> { rig.state().library.pairs().iter().map(|p| p.name.clone()).collect() };
     let before = names(&rig);
     let follow = |rig: &mut Rig| {
-        rig.harness.key_press_modifiers(Modifiers::CTRL | Modifiers::SHIFT, Key::F);
-        rig.harness.step();
-        rig.settle();
+        rig.key(Modifiers::CTRL | Modifiers::SHIFT, Key::F);
     };
     follow(&mut rig);
     assert!(rig.harness.query_by_label("Stop following").is_some(), "the status says that it follows");
 
     // A whole grasp.
-    let tool = &catalog::tools()[0];
+    let tool = &catalog::tools()[6];
     let sample = |seed| sim::simulate(tool, sim::random_grasp(seed), seed, &sim::SimConfig::default());
     write_pair(&rig.data, Layout::Train, &tool.name, 40, &sample(40)).unwrap();
     rig.harness.step();
     rig.settle();
-    let state = rig.harness.state().state();
+    let state = rig.state();
     assert_eq!(names(&rig)[..before.len()], before, "the pairs before keep their places");
     assert!(state.pair_name().ends_with("data_40"), "{}", state.pair_name());
     assert!(results::imprint(state, ImprintSource::Predicted, lab::RIGHT).ready().is_some());
@@ -46,7 +42,6 @@ fn what_arrives_in_a_followed_folder_is_shown_predicted_and_posed() {
         "{:?}",
         results::pose(state, ImprintSource::Predicted)
     );
-    rig.shoot("follow-1280");
 
     // A GelSlim touch alone: predicted, and posed with the cameras of the others.
     let elsewhere = tempfile::tempdir().unwrap();
@@ -55,7 +50,7 @@ fn what_arrives_in_a_followed_folder_is_shown_predicted_and_posed() {
     std::fs::copy(gelslim, &place).unwrap();
     rig.harness.step();
     rig.settle();
-    let state = rig.harness.state().state();
+    let state = rig.state();
     assert!(state.pair_name().ends_with("data_41"), "{}", state.pair_name());
     let measured = results::imprint(state, ImprintSource::Measured, lab::RIGHT);
     assert!(matches!(measured, Lookup::Absent(Absent::NoBubble)), "{measured:?}");
@@ -67,14 +62,11 @@ fn what_arrives_in_a_followed_folder_is_shown_predicted_and_posed() {
     );
     assert_eq!(state.library.follow.as_ref().unwrap().arrived, 2);
     rig.send(prefer(|s| s.workspace = Workspace::Inspect));
-    rig.shoot("follow-gelslim-only-1280");
     let image = rig.harness.render().unwrap();
     assert!(image.pixels().any(|p| p.0[..3] != [0; 3]), "an empty thumbnail must not black out the window");
 
     // Stopped by its button: what comes now is not looked at, until the folder is read again.
-    rig.harness.get_by_label("Stop following").click();
-    rig.harness.step();
-    rig.settle();
+    rig.click("Stop following");
     assert!(rig.harness.query_by_label("Stop following").is_none());
     write_pair(&rig.data, Layout::Train, &tool.name, 42, &sample(42)).unwrap();
     rig.harness.step();

@@ -16,7 +16,6 @@ fn the_picture_on_the_way_is_shown_until_the_result_lands() {
     let Some(mut rig) = Rig::threaded(SIZE) else { return };
     // So many steps that nobody sees the end of them.
     rig.harness.state_mut().push(prefer(|s| (s.generate.preset, s.generate.steps) = (None, 1000)));
-    rig.harness.state_mut().push(prefer(|s| s.hint_dismissed = true));
     rig.harness.state_mut().push(PredictCommand::Generate);
     rig.until("a preview", |state| results::preview(state, lab::RIGHT).is_some());
     for _ in 0..3 {
@@ -24,8 +23,7 @@ fn the_picture_on_the_way_is_shown_until_the_result_lands() {
     }
     assert!(rig.harness.query_by_label("Predicted imprint right, preview").is_some());
     assert!(rig.harness.query_by_label("Predicted imprint right").is_none(), "it is not taken for the result");
-    rig.shoot("generate-preview");
-    let state = rig.harness.state().state();
+    let state = rig.state();
     assert!(results::imprint(state, ImprintSource::Predicted, lab::RIGHT).ready().is_none());
     rig.harness.state_mut().push(TasksCommand::CancelAll);
     rig.until("the end", |state| state.tasks.running.is_empty());
@@ -38,5 +36,5 @@ fn the_picture_on_the_way_is_shown_until_the_result_lands() {
     }
     assert!(rig.harness.query_by_label("Predicted imprint right, preview").is_none());
     assert!(rig.harness.query_by_label("Predicted imprint right").is_some());
-    assert!(results::preview(rig.harness.state().state(), lab::RIGHT).is_none());
+    assert!(results::preview(rig.state(), lab::RIGHT).is_none());
 }

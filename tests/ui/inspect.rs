@@ -13,12 +13,6 @@ use super::rig::Rig;
 const SIZE: [f32; 2] = [1280.0, 800.0];
 
 impl Rig {
-    fn tap(&mut self, modifiers: Modifiers, key: Key) {
-        self.harness.key_press_modifiers(modifiers, key);
-        self.harness.step();
-        self.settle();
-    }
-
     /// Moves the pointer to a share of the widget's rectangle, and clicks there.
     fn click_in(&mut self, label: &str, share: [f32; 2]) {
         let rect = self.harness.get_by_label(label).rect();
@@ -33,16 +27,15 @@ impl Rig {
     }
 
     fn at(&self) -> [usize; 2] {
-        let shown = results::inspected(self.harness.state().state()).expect("a step is shown");
+        let shown = results::inspected(self.state()).expect("a step is shown");
         [shown.run, shown.at]
     }
 
     /// The Align workspace on a grasp with its true contact.
     fn align() -> Option<Self> {
-        let mut rig = Self::new(SIZE, 2)?;
-        rig.send(prefer(|s| s.hint_dismissed = true));
+        let mut rig = Self::new(SIZE, 1)?;
         rig.send(prefer(|s| s.mask.choice.source = MaskSource::Truth));
-        assert!(rig.harness.state().state().results.runs.is_empty(), "nobody looks yet");
+        assert!(rig.state().results.runs.is_empty(), "nobody looks yet");
         rig.send(prefer(|s| s.workspace = Workspace::Align));
         Some(rig)
     }
@@ -51,7 +44,7 @@ impl Rig {
 #[test]
 fn steps_by_keys_by_the_slider_and_in_the_curves() {
     let Some(mut rig) = Rig::align() else { return };
-    let state = rig.harness.state().state();
+    let state = rig.state();
     assert!(state.selection.panes.contains(&Pane::Steps));
     let shown = results::inspected(state).expect("the winner's last step");
     let (run, last) = (shown.run, shown.at);
@@ -61,26 +54,21 @@ fn steps_by_keys_by_the_slider_and_in_the_curves() {
         results::pose(state, ImprintSource::Measured).ready().unwrap().grasp_from_object,
         "at its end it shows the registered pose"
     );
-    rig.tap(Modifiers::NONE, Key::Comma);
-    rig.tap(Modifiers::NONE, Key::Comma);
+    rig.key(Modifiers::NONE, Key::Comma);
+    rig.key(Modifiers::NONE, Key::Comma);
     assert_eq!(rig.at(), [run, last - 2]);
-    rig.tap(Modifiers::NONE, Key::Period);
+    rig.key(Modifiers::NONE, Key::Period);
     assert_eq!(rig.at(), [run, last - 1]);
-    rig.tap(Modifiers::SHIFT, Key::Comma);
+    rig.key(Modifiers::SHIFT, Key::Comma);
     assert_eq!(rig.at(), [run, 0]);
-    rig.shoot("test-steps");
     // The slider, the buttons and the curves do the same.
-    rig.harness.get_by_label("Last step").click();
-    rig.harness.step();
-    rig.settle();
+    rig.click("Last step");
     assert_eq!(rig.at(), [run, last]);
     rig.click_in("Cost over the steps", [0.35, 0.5]);
     let [_, at] = rig.at();
     assert!(at > 0 && at < last, "{at}");
     // Another start by its button.
-    rig.harness.get_by_label("Start 1").click();
-    rig.harness.step();
-    rig.settle();
+    rig.click("Start 1");
     assert_eq!(rig.at()[0], 0);
-    assert_eq!(rig.harness.state().state().results.runs.len(), 1, "scrubbing registers nothing");
+    assert_eq!(rig.state().results.runs.len(), 1, "scrubbing registers nothing");
 }

@@ -21,19 +21,6 @@ use super::rig::Rig;
 const SIZE: [f32; 2] = [1280.0, 800.0];
 
 impl Rig {
-    fn key(&mut self, modifiers: Modifiers, key: Key) {
-        self.harness.key_press_modifiers(modifiers, key);
-        self.harness.step();
-        self.settle();
-    }
-
-    fn click(&mut self, label: &str) {
-        let node = self.harness.get_all_by_label(label).next().unwrap_or_else(|| panic!("no {label:?} on screen"));
-        node.click();
-        self.harness.step();
-        self.settle();
-    }
-
     /// Draws a stroke through shares of the rectangle of the widget `label`.
     fn stroke(&mut self, label: &str, through: &[[f32; 2]]) {
         let rect = self.harness.get_by_label(label).rect();
@@ -71,28 +58,28 @@ fn files(folder: &Path, out: &mut BTreeMap<PathBuf, u64>) {
 
 #[test]
 fn browse_generate_shift_paint_undo() {
-    let Some(mut rig) = Rig::new(SIZE, 3) else { return };
-    let start = rig.harness.state().state().selection.pair;
+    let Some(mut rig) = Rig::new(SIZE, 2) else { return };
+    let start = rig.state().selection.pair;
 
     // Step to the next pair, and back.
     rig.key(Modifiers::NONE, Key::D);
-    let state = rig.harness.state().state();
+    let state = rig.state();
     assert_ne!(state.selection.pair, start);
     let second = state.selection.pair;
     rig.key(Modifiers::NONE, Key::A);
-    assert_eq!(rig.harness.state().state().selection.pair, start);
+    assert_eq!(rig.state().selection.pair, start);
     rig.key(Modifiers::NONE, Key::PageDown);
-    assert_eq!(rig.harness.state().state().selection.pair, second);
+    assert_eq!(rig.state().selection.pair, second);
 
     // An empty pane offers what it lacks; the same by key gives another seed's result when asked so.
     rig.click("Generate (Ctrl+G)");
-    let state = rig.harness.state().state();
+    let state = rig.state();
     for finger in lab::PADS {
         assert!(results::chosen(state, finger).is_some(), "{finger:?}");
         assert!(results::imprint(state, ImprintSource::Predicted, lab::RIGHT).ready().is_some());
     }
     rig.key(Modifiers::CTRL | Modifiers::SHIFT, Key::G);
-    let state = rig.harness.state().state();
+    let state = rig.state();
     let touch = state.touch_key(lab::RIGHT).unwrap();
     assert_eq!(state.results.made[&touch].len(), 2, "the first result is kept");
 
@@ -100,7 +87,7 @@ fn browse_generate_shift_paint_undo() {
     let exact = results::imprint(state, ImprintSource::Predicted, lab::RIGHT).ready().unwrap().clone();
     rig.click("Choice of depth scale");
     rig.click("As in the paper (paper shift)");
-    let state = rig.harness.state().state();
+    let state = rig.state();
     assert_eq!(state.settings.shift, ShiftMode::PaperShift);
     assert_ne!(*results::imprint(state, ImprintSource::Predicted, lab::RIGHT).ready().unwrap(), exact);
 
@@ -108,23 +95,23 @@ fn browse_generate_shift_paint_undo() {
     assert_eq!(state.settings.gel, GelView::Difference);
     rig.click("GelSlim image");
     rig.click("raw");
-    assert_eq!(rig.harness.state().state().settings.gel, GelView::Raw);
+    assert_eq!(rig.state().settings.gel, GelView::Raw);
 
     // Paint, see the pose follow, find the file.
     rig.click("Label");
-    let state = rig.harness.state().state();
+    let state = rig.state();
     assert_eq!(state.settings.workspace, Workspace::Label);
     assert!(state.selection.panes.contains(&Pane::Masks) && state.selection.both_fingers);
     let pair = state.pair_name().to_owned();
     let before = results::pose(state, ImprintSource::Measured).ready().expect("a pose before the stroke").clone();
     let area = |rig: &Rig| {
-        let mask = results::mask_in_force(rig.harness.state().state(), ImprintSource::Measured, lab::RIGHT).unwrap();
+        let mask = results::mask_in_force(rig.state(), ImprintSource::Measured, lab::RIGHT).unwrap();
         mask.mask.as_slice().iter().filter(|on| **on).count()
     };
     let automatic = area(&rig);
     assert_eq!(rig.stored(&pair, lab::RIGHT), None);
     rig.stroke("Measured imprint right", &[[0.1, 0.5], [0.3, 0.45], [0.6, 0.55], [0.9, 0.5]]);
-    let state = rig.harness.state().state();
+    let state = rig.state();
     assert!(state.document.drawn_mask(&pair, &MaskPlace::measured(lab::RIGHT)).is_some());
     assert!(state.document.drawn_mask(&pair, &MaskPlace::measured(lab::LEFT)).is_none(), "only the finger painted on");
     let painted = area(&rig);
@@ -142,25 +129,22 @@ fn browse_generate_shift_paint_undo() {
     assert_eq!(rig.stored(&pair, lab::RIGHT), Some(painted), "undo changes the file too");
     rig.key(Modifiers::CTRL, Key::Z);
     assert_eq!(area(&rig), automatic);
-    assert_eq!(
-        results::pose(rig.harness.state().state(), ImprintSource::Measured).ready().unwrap().num_points,
-        before.num_points
-    );
+    assert_eq!(results::pose(rig.state(), ImprintSource::Measured).ready().unwrap().num_points, before.num_points);
     rig.key(Modifiers::CTRL | Modifiers::SHIFT, Key::Z);
     assert_eq!(area(&rig), painted);
 
     // Done, and the next one is shown; after a restart the mask and the state are still there.
     rig.click("Done and next");
-    assert_ne!(rig.harness.state().state().pair_name(), pair);
+    assert_ne!(rig.state().pair_name(), pair);
     rig.restart(SIZE);
-    let state = rig.harness.state().state();
+    let state = rig.state();
     assert!(state.document.review(&pair).is_finished());
     assert_eq!(rig.stored(&pair, lab::RIGHT), Some(painted));
 }
 
 #[test]
 fn at_rest_nothing_is_drawn_uploaded_or_written() {
-    let Some(mut rig) = Rig::new(SIZE, 2) else { return };
+    let Some(mut rig) = Rig::new(SIZE, 1) else { return };
     rig.send(PredictCommand::Generate);
     // A note on the screen goes by itself: the one thing that is waited for.
     rig.send(TasksCommand::LogSeen(u64::MAX));
@@ -181,9 +165,9 @@ fn at_rest_nothing_is_drawn_uploaded_or_written() {
 
 #[test]
 fn a_wrong_path_is_said_where_it_was_typed_and_what_is_open_stays() {
-    let Some(mut rig) = Rig::new(SIZE, 2) else { return };
-    let pairs = rig.harness.state().state().library.pairs().len();
-    let said = rig.harness.state().state().log.unseen().count();
+    let Some(mut rig) = Rig::new(SIZE, 1) else { return };
+    let pairs = rig.state().library.pairs().len();
+    let said = rig.state().log.unseen().count();
     rig.key(Modifiers::CTRL, Key::O);
     rig.harness.get_by_label("Path").type_text("/nowhere/at/all");
     rig.harness.step();
@@ -201,13 +185,12 @@ fn a_wrong_path_is_said_where_it_was_typed_and_what_is_open_stays() {
     rig.harness.key_press(Key::Escape);
     rig.settle();
     assert!(rig.harness.query_by_label("Use this path").is_none());
-    assert_eq!(rig.harness.state().state().log.unseen().count(), said);
+    assert_eq!(rig.state().log.unseen().count(), said);
     // What was opened before and is gone is said in the log.
     rig.send(LibraryCommand::Open(Place::Path("/nowhere/at/all".into())));
-    rig.shoot("test-notice");
-    let state = rig.harness.state().state();
+    let state = rig.state();
     assert_eq!(state.library.pairs().len(), pairs);
     assert!(state.log.unseen().any(|e| e.level == touch2touch::app::tasks::Level::Error));
     rig.click("Dismiss");
-    assert_eq!(rig.harness.state().state().log.unseen().count(), 0);
+    assert_eq!(rig.state().log.unseen().count(), 0);
 }

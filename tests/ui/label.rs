@@ -23,13 +23,13 @@ const SIZE: [f32; 2] = [1280.0, 800.0];
 impl Rig {
     /// What the last plan of an export says.
     fn plan(&self) -> Vec<String> {
-        let state = self.harness.state().state();
+        let state = self.state();
         state.results.mask_plans.get(&results::mask_plan_key(state).unwrap()).unwrap().lines()
     }
 
     /// The mask of a finger that is in force on the measured imprint.
     fn mask(&self, finger: PadId) -> Mask {
-        (**results::mask_in_force(self.harness.state().state(), ImprintSource::Measured, finger).unwrap().mask).clone()
+        (**results::mask_in_force(self.state(), ImprintSource::Measured, finger).unwrap().mask).clone()
     }
 
     fn button(&mut self, at: Pos2, pressed: bool) {
@@ -53,7 +53,7 @@ impl Rig {
 
 /// Masks that nobody drew are empty: what is drawn is then all there is.
 fn with_nothing_automatic(rig: &mut Rig) {
-    let mut settings = rig.harness.state().state().settings.mask.clone();
+    let mut settings = rig.state().settings.mask.clone();
     settings.choice = MaskChoice { source: MaskSource::Threshold, threshold_m: 0.09, ..settings.choice };
     rig.send(prefer(move |s| s.mask = settings.clone()));
 }
@@ -69,7 +69,6 @@ fn count(mask: &Mask) -> usize {
 #[test]
 fn tools_draw_by_mouse_and_a_click_on_the_other_finger_paints_nothing() {
     let Some(mut rig) = Rig::new(SIZE, 1) else { return };
-    rig.send(prefer(|s| s.hint_dismissed = true));
     rig.send(prefer(|s| s.workspace = Workspace::Label));
     rig.send(ViewCommand::ShowBothFingers(true));
     with_nothing_automatic(&mut rig);
@@ -80,7 +79,7 @@ fn tools_draw_by_mouse_and_a_click_on_the_other_finger_paints_nothing() {
     let before = rig.mask(lab::LEFT);
     rig.drag_over(&[left.center(), inside(left, 0.3, 0.3)]);
     assert_eq!(rig.mask(lab::LEFT), before);
-    assert_eq!(rig.harness.state().state().selection.finger, lab::LEFT);
+    assert_eq!(rig.state().selection.finger, lab::LEFT);
     rig.drag_over(&[left.center(), inside(left, 0.3, 0.3)]);
     assert_ne!(rig.mask(lab::LEFT), before, "the second one paints");
     rig.drag_over(&[right.center(), right.center()]);
@@ -88,7 +87,7 @@ fn tools_draw_by_mouse_and_a_click_on_the_other_finger_paints_nothing() {
     let empty = rig.mask(lab::RIGHT);
     rig.harness.key_press(Key::L);
     rig.harness.step();
-    assert_eq!(rig.harness.state().state().settings.mask.tool, MaskTool::Lasso);
+    assert_eq!(rig.state().settings.mask.tool, MaskTool::Lasso);
     rig.drag_over(&[
         inside(right, 0.1, 0.1),
         inside(right, 0.4, 0.1),
@@ -104,28 +103,23 @@ fn tools_draw_by_mouse_and_a_click_on_the_other_finger_paints_nothing() {
         rig.button(at, true);
         rig.button(at, false);
     }
-    rig.shoot("label-polygon");
     rig.button(corners[0], true);
     rig.button(corners[0], false);
     rig.settle();
-    assert!(rig.harness.state().state().document.stroke.is_none(), "the first corner closes it");
+    assert!(rig.state().document.stroke.is_none(), "the first corner closes it");
     let drawn = rig.mask(lab::RIGHT);
     assert!(count(&drawn) > count(&lassoed) + 500, "{} {}", count(&lassoed), count(&drawn));
     for _ in 0..2 {
-        rig.harness.key_press_modifiers(Modifiers::CTRL, Key::Z);
-        rig.harness.step();
-        rig.settle();
+        rig.key(Modifiers::CTRL, Key::Z);
     }
     assert_eq!(rig.mask(lab::RIGHT), empty);
     let saved = rig.harness.get_by_label("saved").rect();
     assert!(saved.right() < SIZE[0] - 4.0, "{saved:?} is cut off");
-    rig.shoot("label-desk");
 }
 
 #[test]
 fn a_polygon_grows_by_quick_clicks_whatever_was_drawn_before() {
     let Some(mut rig) = Rig::new(SIZE, 1) else { return };
-    rig.send(prefer(|s| s.hint_dismissed = true));
     rig.send(prefer(|s| s.workspace = Workspace::Label));
     let right = rig.harness.get_by_label("Measured imprint right").rect();
     let corners = [[0.6, 0.2], [0.9, 0.2], [0.9, 0.8]].map(|[x, y]| inside(right, x, y));
@@ -139,7 +133,7 @@ fn a_polygon_grows_by_quick_clicks_whatever_was_drawn_before() {
         rig.harness.step();
         rig.harness.step();
     };
-    let points = |rig: &Rig| rig.harness.state().state().document.stroke.as_ref().map(|s| s.drawing.points.len());
+    let points = |rig: &Rig| rig.state().document.stroke.as_ref().map(|s| s.drawing.points.len());
     let key = |rig: &mut Rig, key| {
         rig.harness.key_press(key);
         rig.harness.step();
@@ -163,9 +157,8 @@ fn a_polygon_grows_by_quick_clicks_whatever_was_drawn_before() {
 #[test]
 fn a_letter_changes_no_labels_elsewhere_and_another_way_can_be_taken_back_at_once() {
     let Some(mut rig) = Rig::new(SIZE, 1) else { return };
-    rig.send(prefer(|s| s.hint_dismissed = true));
     let reviewed = |rig: &Rig| {
-        let state = rig.harness.state().state();
+        let state = rig.state();
         state.document.review(state.pair_name())
     };
     let letters = [Key::T, Key::H, Key::K];
@@ -182,7 +175,7 @@ fn a_letter_changes_no_labels_elsewhere_and_another_way_can_be_taken_back_at_onc
         assert_eq!((rig.mask(lab::RIGHT), reviewed(&rig)), (before, Review::Todo), "{workspace:?} {asking}");
         rig.harness.key_press(Key::Escape);
         rig.settle();
-        assert!(!rig.harness.state().state().export.asking_masks, "Escape closes the form");
+        assert!(!rig.state().export.asking_masks, "Escape closes the form");
     }
     rig.send(prefer(|s| s.workspace = Workspace::Inspect));
     rig.send(LabelsCommand::SetReview(Review::Flagged));
@@ -198,7 +191,6 @@ fn a_letter_changes_no_labels_elsewhere_and_another_way_can_be_taken_back_at_onc
 #[test]
 fn masks_are_drawn_on_the_points_of_the_3d_view() {
     let Some(mut rig) = Rig::new(SIZE, 1) else { return };
-    rig.send(prefer(|s| s.hint_dismissed = true));
     rig.send(prefer(|s| s.workspace = Workspace::Label));
     rig.send(ViewCommand::ShowBothFingers(true));
     with_nothing_automatic(&mut rig);
@@ -213,11 +205,7 @@ fn masks_are_drawn_on_the_points_of_the_3d_view() {
     look(&mut rig, CameraPreset::Right);
     // Where the point of a finger's pixel is on the screen.
     let place = |rig: &Rig, finger: PadId, [x, y]: [usize; 2]| {
-        let cloud = results::cloud(rig.harness.state().state(), ImprintSource::Measured)
-            .ready()
-            .unwrap()
-            .finger(finger)
-            .unwrap();
+        let cloud = results::cloud(rig.state(), ImprintSource::Measured).ready().unwrap().finger(finger).unwrap();
         let point = cloud.points[cloud.at_pixel(x, y).unwrap()];
         rig.harness.state().on_screen(ImprintSource::Measured, point.to_array()).unwrap()
     };
@@ -227,10 +215,8 @@ fn masks_are_drawn_on_the_points_of_the_3d_view() {
     rig.drag_over(&[from, to]);
     assert_eq!(rig.mask(lab::RIGHT), empty);
     look(&mut rig, CameraPreset::Right);
-    rig.harness.key_press_modifiers(Modifiers::ALT, Key::B);
-    rig.harness.step();
-    rig.settle();
-    assert_eq!(rig.harness.state().state().workbench.tool, SceneTool::Paint);
+    rig.key(Modifiers::ALT, Key::B);
+    assert_eq!(rig.state().workbench.tool, SceneTool::Paint);
     let [from, to] = [[70, 60], [100, 75]].map(|pixel| place(&rig, lab::RIGHT, pixel));
     rig.drag_over(&[from, to]);
     assert_eq!(place(&rig, lab::RIGHT, [70, 60]), from, "the view rests");
@@ -240,10 +226,7 @@ fn masks_are_drawn_on_the_points_of_the_3d_view() {
     let new = count(&drawn) - count(&empty);
     assert!((150..600).contains(&new), "{new}");
     rig.harness.query_by_label_contains("draws on front-most points").expect("the status line says what is reached");
-    rig.shoot("label-3d");
-    rig.harness.key_press_modifiers(Modifiers::CTRL, Key::Z);
-    rig.harness.step();
-    rig.settle();
+    rig.key(Modifiers::CTRL, Key::Z);
     assert_eq!(rig.mask(lab::RIGHT), empty, "one undo takes it back");
     // With Shift the pointer turns the view and draws nothing.
     let press = |pressed| Event::PointerButton {
@@ -263,7 +246,7 @@ fn masks_are_drawn_on_the_points_of_the_3d_view() {
     look(&mut rig, CameraPreset::Left);
     let [from, to] = [[70, 60], [100, 75]].map(|pixel| place(&rig, lab::LEFT, pixel));
     rig.drag_over(&[from, to]);
-    assert_eq!(rig.harness.state().state().selection.finger, lab::LEFT);
+    assert_eq!(rig.state().selection.finger, lab::LEFT);
     assert_eq!(rig.mask(lab::LEFT), left);
     rig.harness.key_press(Key::L);
     rig.harness.step();
@@ -272,11 +255,8 @@ fn masks_are_drawn_on_the_points_of_the_3d_view() {
     assert_eq!(rig.mask(lab::RIGHT), empty, "one finger's mask");
     let lassoed = count(&rig.mask(lab::LEFT)) - count(&left);
     assert!((1000..2600).contains(&lassoed), "{lassoed} of 50 x 40");
-    rig.shoot("label-3d-lasso");
-    rig.harness.key_press_modifiers(Modifiers::ALT, Key::L);
-    rig.harness.step();
-    rig.settle();
-    assert_eq!(rig.harness.state().state().settings.mask.layers, Layers::All);
+    rig.key(Modifiers::ALT, Key::L);
+    assert_eq!(rig.state().settings.mask.layers, Layers::All);
     rig.harness.hover_at(from);
     rig.settle();
     rig.harness.query_by_label_contains("draws on all points").expect("it says so");
@@ -285,7 +265,6 @@ fn masks_are_drawn_on_the_points_of_the_3d_view() {
 #[test]
 fn an_export_says_what_goes_where_before_it_writes() {
     let Some(mut rig) = Rig::new(SIZE, 2) else { return };
-    rig.send(prefer(|s| s.hint_dismissed = true));
     rig.send(prefer(|s| s.workspace = Workspace::Label));
     rig.send(LabelsCommand::AdoptAutomatic);
     rig.send(LibraryCommand::Step(1));
@@ -293,14 +272,11 @@ fn an_export_says_what_goes_where_before_it_writes() {
     rig.send(LabelsCommand::SetReview(Review::Done));
     rig.send(LibraryCommand::Step(1));
     rig.send(LabelsCommand::SetReview(Review::Skip));
-    rig.harness.key_press_modifiers(Modifiers::CTRL, Key::E);
-    rig.harness.step();
-    rig.settle();
+    rig.key(Modifiers::CTRL, Key::E);
     let said = rig.plan();
     // Done accepted the other finger's automatic mask.
     assert_eq!(said[0], "2 masks");
     assert!(said.iter().any(|line| line.contains("1 pair begun")) && said.iter().any(|line| line.contains("skip")));
-    rig.shoot("export-masks");
     // What is marked beside the form is in the next plan.
     rig.send(LabelsCommand::SetReview(Review::Done));
     assert_eq!(rig.plan()[0], "4 masks");
@@ -315,7 +291,7 @@ fn an_export_says_what_goes_where_before_it_writes() {
         .sum();
     assert_eq!(written, 5);
     assert!(list(&folder, None).unwrap().refused.is_empty());
-    let state = rig.harness.state().state();
+    let state = rig.state();
     assert_eq!(state.log.entries.back().unwrap().place.as_deref(), Some(&*folder), "the note leads there");
     assert!(!state.export.asking_masks);
 }
@@ -323,7 +299,6 @@ fn an_export_says_what_goes_where_before_it_writes() {
 #[test]
 fn undo_and_redo_go_on_where_they_were_after_a_restart() {
     let Some(mut rig) = Rig::new(SIZE, 1) else { return };
-    rig.send(prefer(|s| s.hint_dismissed = true));
     rig.send(prefer(|s| s.workspace = Workspace::Label));
     with_nothing_automatic(&mut rig);
     rig.send(prefer(|s| s.person = "Anna".into()));
@@ -334,13 +309,13 @@ fn undo_and_redo_go_on_where_they_were_after_a_restart() {
         rig.drag_over(&way.map(|[x, y]| inside(rect, x, y)));
         masks.push(rig.mask(lab::RIGHT));
     }
-    rig.send(LabelsCommand::CleanUp(rig.harness.state().state().settings.mask.clean_up(CleanKind::Grow)));
+    rig.send(LabelsCommand::CleanUp(rig.state().settings.mask.clean_up(CleanKind::Grow)));
     masks.push(rig.mask(lab::RIGHT));
     rig.send(LabelsCommand::Undo);
     assert!(masks.windows(2).all(|pair| pair[0] != pair[1]));
     // Who did it stands in the file and in the journal.
     let store = MaskStore::for_dataset(&Dataset::open(&rig.data).unwrap()).unwrap();
-    let name = rig.harness.state().state().pair_name().to_owned();
+    let name = rig.state().pair_name().to_owned();
     assert_eq!(store.load(&name, lab::RIGHT).unwrap().unwrap().person, "Anna");
     let journal = String::from_utf8(store.journal(&name).unwrap()).unwrap();
     assert_eq!(journal.lines().filter(|line| line.contains("\"person\":\"Anna\"")).count(), 5, "{journal}");
@@ -348,7 +323,7 @@ fn undo_and_redo_go_on_where_they_were_after_a_restart() {
     rig.restart(SIZE);
     assert_eq!(rig.mask(lab::RIGHT), masks[3]);
     let names = |rig: &Rig| -> Vec<String> {
-        rig.harness.state().state().history.done().iter().map(|gesture| gesture.name.to_string()).collect()
+        rig.state().history.done().iter().map(|gesture| gesture.name.to_string()).collect()
     };
     assert_eq!(names(&rig), ["brush stroke"; 3]);
     rig.send(LabelsCommand::Redo);
@@ -357,7 +332,7 @@ fn undo_and_redo_go_on_where_they_were_after_a_restart() {
         rig.send(LabelsCommand::Undo);
         assert_eq!(rig.mask(lab::RIGHT), *mask);
     }
-    assert_eq!(rig.harness.state().state().document.review(rig.harness.state().state().pair_name()), Review::Todo);
+    assert_eq!(rig.state().document.review(rig.state().pair_name()), Review::Todo);
     rig.restart(SIZE);
     assert!(names(&rig).is_empty());
     for mask in &masks[1..] {
@@ -366,7 +341,7 @@ fn undo_and_redo_go_on_where_they_were_after_a_restart() {
     }
     // Another program changes the mask: what led elsewhere cannot be taken back any more.
     let dataset = Dataset::open(&rig.data).unwrap();
-    let name = rig.harness.state().state().pair_name().to_owned();
+    let name = rig.state().pair_name().to_owned();
     let store = MaskStore::for_dataset(&dataset).unwrap();
     store.save(&name, lab::RIGHT, None).unwrap();
     rig.restart(SIZE);
@@ -376,8 +351,7 @@ fn undo_and_redo_go_on_where_they_were_after_a_restart() {
 
 #[test]
 fn masks_are_exported_as_pictures_and_imported_again_by_clicks() {
-    let Some(mut rig) = Rig::new(SIZE, 2) else { return };
-    rig.send(prefer(|s| s.hint_dismissed = true));
+    let Some(mut rig) = Rig::new(SIZE, 1) else { return };
     rig.send(prefer(|s| s.workspace = Workspace::Label));
     with_nothing_automatic(&mut rig);
     rig.send(LabelsCommand::AdoptAutomatic);
@@ -387,7 +361,6 @@ fn masks_are_exported_as_pictures_and_imported_again_by_clicks() {
     rig.send(LabelsCommand::SetReview(Review::Done));
     rig.clicks(&["Open", "Export masks…"]);
     rig.clicks(&["PNG"]);
-    rig.shoot("export-forms");
     let folder = rig.data.join("pictures");
     rig.clicks(&["Choose the folder of the export"]);
     rig.take_to(&folder);
@@ -402,13 +375,9 @@ fn masks_are_exported_as_pictures_and_imported_again_by_clicks() {
     rig.take_to(&folder);
     rig.harness.get_by_label("Format: PNG");
     rig.harness.get_by_label("1 mask new");
-    rig.shoot("import-masks");
     rig.clicks(&["Import these masks"]);
     assert_eq!(rig.mask(lab::RIGHT), drawn);
-    rig.shoot("imported");
-    rig.harness.key_press_modifiers(Modifiers::CTRL, Key::Z);
-    rig.harness.step();
-    rig.settle();
+    rig.key(Modifiers::CTRL, Key::Z);
     assert_ne!(rig.mask(lab::RIGHT), drawn, "undo brings back what was");
 
     // What cannot be read is said in the form, with its place.
@@ -417,7 +386,6 @@ fn masks_are_exported_as_pictures_and_imported_again_by_clicks() {
     std::fs::create_dir(&empty).unwrap();
     rig.take_to(&empty);
     rig.harness.get_by_label_contains("there are no masks here");
-    rig.shoot("import-refused");
     rig.clicks(&["Close"]);
-    assert!(rig.harness.state().state().export.importing.is_none());
+    assert!(rig.state().export.importing.is_none());
 }

@@ -13,8 +13,6 @@ use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::label::Paint;
 use touch2touch_core::manual::PoseAxis;
 use touch2touch_core::rig::lab;
-use touch2touch_core::sim::Fault;
-use touch2touch_pipeline::io::simulated::{Layout, write_pair, write_tools};
 
 use super::rig::Rig;
 
@@ -24,8 +22,7 @@ const STRAY: PlanarPose = PlanarPose { theta_rad: -0.7, y_m: 0.008, z_m: 0.0 };
 /// Every workspace draws something in both themes and sizes.
 #[test]
 fn every_workspace_draws_in_both_themes() {
-    let Some(mut rig) = Rig::new([1280.0, 800.0], 3) else { return };
-    rig.send(prefer(|s| s.hint_dismissed = true));
+    let Some(mut rig) = Rig::new([1280.0, 800.0], 1) else { return };
     rig.send(PredictCommand::Generate);
     for theme in [Theme::Dark, Theme::Light] {
         rig.send(prefer(move |s| s.theme = theme));
@@ -50,7 +47,6 @@ fn pictures_for_the_docs() {
     for (size, name) in [([1280.0, 800.0], "1280"), ([1920.0, 1080.0], "1920")] {
         let Some(mut rig) = Rig::live(size, Place::Demo) else { return };
         rig.shoot(&format!("{name}-first-start"));
-        rig.send(prefer(|s| s.hint_dismissed = true));
         rig.send(LibraryCommand::Select(PairId(30)));
         rig.send(PredictCommand::Generate);
         rig.shoot(&format!("{name}-demo-inspect"));
@@ -91,7 +87,7 @@ fn pictures_for_the_docs() {
             rig.send(LabelsCommand::StrokeTo(to));
             rig.send(LabelsCommand::EndStroke);
         }
-        let mut mask = rig.harness.state().state().settings.mask.clone();
+        let mut mask = rig.state().settings.mask.clone();
         mask.proposal = ProposalSource::CadTruth;
         rig.send(prefer(move |s| s.mask = mask.clone()));
         rig.send(ViewCommand::Propose(true));
@@ -116,32 +112,5 @@ fn pictures_for_the_docs() {
             rig.send(PredictCommand::Generate);
             rig.shoot(&format!("{name}-pairs-inspect"));
         }
-    }
-}
-
-/// The five faults of `touch2touch simulate --faults`, as docs/workbench.md shows them.
-#[test]
-#[ignore = "pictures for looking at, into the folder TOUCH2TOUCH_SCREENSHOTS"]
-fn pictures_of_the_faults() {
-    let folder = tempfile::tempdir().unwrap();
-    let models: Vec<_> = Fault::iter().map(|f| (f.to_string(), f.mesh())).collect();
-    let tools: Vec<_> = models.iter().map(|(name, mesh)| (name.as_str(), false, mesh.clone())).collect();
-    write_tools(folder.path(), &tools).unwrap();
-    for fault in Fault::iter() {
-        write_pair(folder.path(), Layout::Test, &fault.to_string(), 0, &fault.sample()).unwrap();
-    }
-    let Some(mut rig) = Rig::live([1280.0, 800.0], Place::Path(folder.path().to_owned())) else { return };
-    rig.send(prefer(|s| s.hint_dismissed = true));
-    rig.send(prefer(|s| s.workspace = Workspace::Align));
-    let pairs = rig.harness.state().state().library.open.as_ref().unwrap().index().pairs.clone();
-    for (id, pair) in pairs.iter().enumerate() {
-        rig.send(LibraryCommand::Select(PairId(id as u32)));
-        let name = pair.tool.clone().unwrap();
-        rig.shoot(&format!("fault-{name}-plain"));
-        for layer in [Layer::Residuals, Layer::Reasons] {
-            rig.send(Command::Workbench(WorkbenchCommand::SetLayer(layer)));
-            rig.shoot(&format!("fault-{name}-{}", layer.name()).to_lowercase());
-        }
-        rig.send(Command::Workbench(WorkbenchCommand::SetLayer(Layer::None)));
     }
 }

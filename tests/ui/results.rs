@@ -19,24 +19,19 @@ fn a_table_is_made_by_a_click_shown_and_exported() {
     let data = folder.path().join("grasps");
     write_dataset(&data, 2);
     let Some(mut rig) = Rig::live([1280.0, 800.0], Place::Path(data.clone())) else { return };
-    rig.send(prefer(|s| s.hint_dismissed = true));
     rig.send(prefer(|s| s.workspace = Workspace::Evaluate));
-    assert!(rig.harness.state().state().selection.panes.contains(&Pane::Results));
-    rig.shoot("results-before");
+    assert!(rig.state().selection.panes.contains(&Pane::Results));
 
-    rig.harness.get_by_label("Predict all").click();
-    rig.harness.step();
-    rig.settle();
-    let table = rig.harness.state().state().table.result.clone().expect("the table is there");
+    rig.click("Predict all");
+    let table = rig.state().table.result.clone().expect("the table is there");
     assert!(table.complete && table.skipped.is_empty(), "{:?}", table.skipped);
-    let generators = results::evaluated(rig.harness.state().state()).count();
+    let generators = results::evaluated(rig.state()).count();
     assert_eq!((table.rows.len(), table.groups.len()), (1 + generators, 1), "the upper bound and every generator");
     let figures = &table.rows[1].groups[0];
     assert_eq!((figures.grasps, figures.images), (4, 8));
     assert!(figures.named("psnr_db").unwrap().value > 15.0 && figures.named("success_10").is_some());
     let row = format!("{}: 4 grasps, 8 images", table.rows[1].method);
     rig.harness.get_by_label(&row);
-    rig.shoot("results-after");
     rig.send(Command::Evaluate(EvaluateCommand::Published(true)));
     rig.harness.get_by_label_contains("Measured (upper bound)");
 
@@ -49,11 +44,11 @@ fn a_table_is_made_by_a_click_shown_and_exported() {
 
     // The scores of all pairs are those of the table.
     let value = |rig: &Rig, source: usize, pair: u32, metric: Metric| {
-        rig.harness.state().state().table.scores.sources[source].value(PairId(pair), metric)
+        rig.state().table.scores.sources[source].value(PairId(pair), metric)
     };
     for (source, scores) in table.scores.iter().enumerate() {
         for grasp in &scores.grasps {
-            let index = &rig.harness.state().state().library.open.as_ref().unwrap().source.clone();
+            let index = &rig.state().library.open.as_ref().unwrap().source.clone();
             let pair = index.dataset.index.pairs.iter().position(|entry| entry.name == grasp.pair).unwrap() as u32;
             assert_eq!(value(&rig, source, pair, Metric::Angle), grasp.angle_error_rad);
             assert_eq!(value(&rig, source, pair, Metric::Psnr), grasp.metric(Metric::Psnr));
@@ -63,25 +58,20 @@ fn a_table_is_made_by_a_click_shown_and_exported() {
     let mut errors: Vec<f64> = (0..4).map(|pair| value(&rig, 1, pair, Metric::Angle).unwrap()).collect();
     errors.sort_by(|a, b| b.total_cmp(a));
     for wanted in &errors[..2] {
-        rig.harness.key_press_modifiers(Modifiers::NONE, Key::N);
-        rig.harness.step();
-        rig.settle();
-        let state = rig.harness.state().state();
+        rig.key(Modifiers::NONE, Key::N);
+        let state = rig.state();
         assert_eq!(state.library.sort, Sort::Score);
         assert_eq!(state.table.value(state.selection.pair.unwrap()), Some(*wanted));
     }
-    rig.shoot("results-worst");
 
     // By another score, the other way round, from the table's heading.
     let heading = "Sort by PSNR";
     let listed = |rig: &Rig| {
-        let state = rig.harness.state().state();
+        let state = rig.state();
         state.library.order.iter().map(|pair| value(rig, 1, pair.0, Metric::Psnr).unwrap()).collect::<Vec<f64>>()
     };
     for best_first in [false, true] {
-        rig.harness.get_by_label(heading).click();
-        rig.harness.step();
-        rig.settle();
+        rig.click(heading);
         let found = listed(&rig);
         assert!(found.windows(2).all(|pair| (pair[0] >= pair[1]) == best_first || pair[0] == pair[1]), "{found:?}");
     }
@@ -102,18 +92,14 @@ fn a_table_is_made_by_a_click_shown_and_exported() {
     };
     let few = headings(&rig);
     assert!((5..=7).contains(&few), "{few}");
-    rig.harness.get_by_label("more columns").click();
-    rig.harness.step();
-    rig.settle();
+    rig.click("more columns");
     assert!(headings(&rig) > few);
     // A click on a method has the pairs show its scores.
-    rig.harness.get_by_label(&format!("{}: 4 grasps, 8 images", table.rows[0].method)).click();
-    rig.harness.step();
-    rig.settle();
-    assert!(rig.harness.state().state().table.by().unwrap().0.upper_bound);
+    rig.click(&format!("{}: 4 grasps, 8 images", table.rows[0].method));
+    assert!(rig.state().table.by().unwrap().0.upper_bound);
 
     // A table is of one data set.
     rig.send(LibraryCommand::Open(Place::Demo));
-    assert!(rig.harness.state().state().table.result.is_none());
-    assert!(rig.harness.state().state().table.scores.sources.is_empty());
+    assert!(rig.state().table.result.is_none());
+    assert!(rig.state().table.scores.sources.is_empty());
 }

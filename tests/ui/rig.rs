@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
+use eframe::egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::command::Command;
@@ -13,9 +14,10 @@ use touch2touch::app::services::Services;
 use touch2touch::app::settings::{MaskSource, Settings};
 use touch2touch::app::state::State;
 use touch2touch::ui::{Options, StudioApp};
-use touch2touch_core::catalog::{self, ToolSpec};
-use touch2touch_core::sim;
-use touch2touch_pipeline::io::simulated::{Layout, pair_paths, write_pair, write_tools};
+use touch2touch_core::catalog;
+use touch2touch_pipeline::io::simulated::{Layout, pair_paths};
+
+use crate::support::{tiny, write_grasps};
 
 /// The program's services, which wait for nothing, with these preferences beside what a test of the others asks for:
 /// predictions are asked for, masks come from the threshold.
@@ -23,7 +25,7 @@ fn services(config: &Path, change: impl FnOnce(&mut Settings)) -> Arc<Services> 
     let services = Services { patience: Duration::ZERO, ..Services::with_config_folder(Some(config.to_owned())) };
     let mut settings = services.load_settings().0;
     settings.generate.by_itself = false;
-    settings.about_own_data = false;
+    (settings.about_own_data, settings.hint_dismissed) = (false, true);
     change(&mut settings);
     services.save_settings(&settings).unwrap();
     Arc::new(services)
@@ -33,23 +35,9 @@ fn by_threshold(settings: &mut Settings) {
     settings.mask.choice.source = MaskSource::Threshold;
 }
 
-/// Writes a data set of a few simulated grasps of two tools.
+/// Writes a data set of a few simulated grasps of two tools, whose CAD models are small.
 pub(super) fn write_dataset(root: &Path, grasps: u64) {
-    write_tools_touched(root, &catalog::tools()[..2], grasps);
-}
-
-/// The same of other tools.
-fn write_tools_touched(root: &Path, tools: &[ToolSpec], grasps: u64) {
-    let config = sim::SimConfig::default();
-    for tool in tools {
-        for index in 0..grasps {
-            let grasp = sim::random_grasp(index + 3);
-            let sample = sim::simulate(tool, grasp, index, &config);
-            write_pair(root, Layout::Train, &tool.name, index, &sample).unwrap();
-        }
-    }
-    let meshes: Vec<_> = tools.iter().map(|t| (t.name.as_str(), t.seen, t.mesh())).collect();
-    write_tools(root, &meshes).unwrap();
+    write_grasps(root, Layout::Train, &catalog::tools()[6..8], grasps);
 }
 
 /// A studio that runs, and the folders it works in.
@@ -68,7 +56,7 @@ impl Rig {
         crate::support::gpu()?;
         let folder = tempfile::tempdir().unwrap();
         let (data, config) = (folder.path().join("data"), folder.path().join("config"));
-        write_tools_touched(&data, &catalog::tools()[..2], grasps);
+        write_dataset(&data, grasps);
         let services = services(&config, by_threshold);
         let harness = Self::build(size, services, Some(data.clone()), true);
         let mut rig = Self { harness, data, config, _folder: folder };
@@ -81,10 +69,9 @@ impl Rig {
         crate::support::gpu()?;
         let folder = tempfile::tempdir().unwrap();
         let (data, config) = (folder.path().join("data"), folder.path().join("config"));
-        let tool = &catalog::tools()[0];
-        let sample = sim::simulate(tool, sim::random_grasp(3), 3, &sim::SimConfig::default());
-        let written = write_pair(&data, Layout::Train, &tool.name, 0, &sample).unwrap();
-        write_tools(&data, &[(tool.name.as_str(), tool.seen, tool.mesh())]).unwrap();
+        let tool = &catalog::tools()[6];
+        write_grasps(&data, Layout::Train, std::slice::from_ref(tool), 1);
+        let written = pair_paths(&data, Layout::Train, &tool.name, 0);
         for index in 1..pairs {
             for (file, again) in written.iter().zip(pair_paths(&data, Layout::Train, &tool.name, index)) {
                 std::fs::hard_link(file, again).unwrap();
@@ -109,7 +96,7 @@ impl Rig {
     pub(super) fn with_bundle(size: [f32; 2], name: &str) -> Option<Self> {
         let mut rig = Self::new(size, 1)?;
         let services = services(&rig.config, |settings| {
-            settings.bundle_folders = vec![Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles")];
+            settings.bundle_folders = vec![tiny("")];
             settings.generate.bundle = Some(name.to_owned());
             settings.mask.choice.source = MaskSource::default();
         });
@@ -121,8 +108,8 @@ impl Rig {
     /// Frames until something is so; a failure after five minutes.
     pub(super) fn until(&mut self, what: &str, so: impl Fn(&State) -> bool) {
         let begin = std::time::Instant::now();
-        while !so(self.harness.state().state()) {
-            assert!(begin.elapsed().as_secs() < 300, "waited for {what}: {:?}", self.harness.state().state().tasks);
+        while !so(self.state()) {
+            assert!(begin.elapsed().as_secs() < 300, "waited for {what}: {:?}", self.state().tasks);
             self.harness.step();
             std::thread::sleep(std::time::Duration::from_millis(5));
         }
@@ -194,12 +181,31 @@ impl Rig {
     pub(super) fn settle(&mut self) {
         for _ in 0..600 {
             self.harness.step();
-            if self.harness.state().is_idle() && self.harness.state().state().library.open.is_some() {
+            if self.harness.state().is_idle() && self.state().library.open.is_some() {
                 break;
             }
         }
-        assert!(self.harness.state().is_idle(), "{:?}", self.harness.state().state().tasks);
+        assert!(self.harness.state().is_idle(), "{:?}", self.state().tasks);
         self.harness.run();
+    }
+
+    pub(super) fn state(&self) -> &State {
+        self.harness.state().state()
+    }
+
+    /// Presses a key, and lets the studio come to rest.
+    pub(super) fn key(&mut self, modifiers: Modifiers, key: Key) {
+        self.harness.key_press_modifiers(modifiers, key);
+        self.harness.step();
+        self.settle();
+    }
+
+    /// Clicks on the first thing of this name, and lets the studio come to rest.
+    pub(super) fn click(&mut self, label: &str) {
+        let node = self.harness.get_all_by_label(label).next().unwrap_or_else(|| panic!("no {label:?} on screen"));
+        node.click();
+        self.harness.step();
+        self.settle();
     }
 
     /// Carries a command out as if a pane had sent it.
@@ -212,9 +218,7 @@ impl Rig {
     /// Lets a pane fill the window, by the menu in its title.
     pub(super) fn fill(&mut self, title: &str) {
         for label in [format!("Menu of {title}"), format!("Fill the window: {title}")] {
-            self.harness.get_by_label(&label).click();
-            self.harness.step();
-            self.settle();
+            self.click(&label);
         }
     }
 

@@ -6,17 +6,12 @@ use touch2touch::app::command::WorkbenchCommand;
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::results;
 use touch2touch::app::settings::SceneLayer;
-use touch2touch::app::state::State;
 use touch2touch::app::workbench::Layer;
 use touch2touch_core::rig::lab;
 
 use super::rig::Rig;
 
 const MEASURED: ImprintSource = ImprintSource::Measured;
-
-fn state(rig: &Rig) -> &State {
-    rig.harness.state().state()
-}
 
 /// Colors of the measured view, as a set.
 fn colors(rig: &mut Rig) -> std::collections::BTreeSet<[u8; 4]> {
@@ -29,14 +24,14 @@ fn colors(rig: &mut Rig) -> std::collections::BTreeSet<[u8; 4]> {
 #[test]
 fn distances_are_those_of_the_contact_points_and_colors_show_them() {
     let Some(mut rig) = Rig::aligned() else { return };
-    assert!(results::deviation(state(&rig), MEASURED).ready().is_none(), "nothing is computed that no view shows");
+    assert!(results::deviation(rig.state(), MEASURED).ready().is_none(), "nothing is computed that no view shows");
     let before = colors(&mut rig);
     rig.send(WorkbenchCommand::SetLayer(Layer::Distance));
     rig.settle();
-    let found = results::deviation(state(&rig), MEASURED).ready().expect("the view shows it");
-    let clouds = results::cloud(state(&rig), MEASURED).ready().unwrap();
-    let tool = &results::tool(state(&rig)).ready().unwrap().model;
-    let pose = results::pose(state(&rig), MEASURED).ready().unwrap().grasp_from_object;
+    let found = results::deviation(rig.state(), MEASURED).ready().expect("the view shows it");
+    let clouds = results::cloud(rig.state(), MEASURED).ready().unwrap();
+    let tool = &results::tool(rig.state()).ready().unwrap().model;
+    let pose = results::pose(rig.state(), MEASURED).ready().unwrap().grasp_from_object;
     assert_eq!(found.grasp_from_object, pose);
     let cloud = clouds.finger(lab::RIGHT).unwrap();
     let contact: Vec<_> = (0..cloud.points.len()).filter(|i| cloud.contact[*i]).collect();
@@ -51,7 +46,6 @@ fn distances_are_those_of_the_contact_points_and_colors_show_them() {
     let with = colors(&mut rig);
     // Whites, blues and reds of the map that no picture has without it.
     assert!(with.difference(&before).count() > 200);
-    rig.shoot("test-distances");
 }
 
 #[test]
@@ -62,8 +56,8 @@ fn the_list_of_what_is_drawn_switches_it_and_it_stays_so() {
     let before = colors(&mut rig);
     let at = rig.harness.get_by_label("Show membrane, measured").rect().center();
     rig.click_at(at);
-    assert!(!state(&rig).settings.scene.shows(SceneLayer::Membrane));
+    assert!(!rig.state().settings.scene.shows(SceneLayer::Membrane));
     assert!(colors(&mut rig).len() < before.len());
     rig.click_at(at);
-    assert!(state(&rig).settings.scene.hidden.is_empty());
+    assert!(rig.state().settings.scene.hidden.is_empty());
 }

@@ -27,42 +27,30 @@ fn a_click_reads_the_model_in_the_unit_that_fits() {
         stl::write(&file, &mesh).unwrap();
     }
     rig.restart(SIZE);
-    rig.send(prefer(|s| s.hint_dismissed = true));
-    for size in [SIZE, [1024.0, 700.0]] {
-        rig.harness.set_size(size.into());
-        for workspace in [Workspace::Inspect, Workspace::Align] {
-            rig.send(prefer(move |s| s.workspace = workspace));
-            rig.shoot(&format!("unit-{}-{}", workspace.name(), size[0]).to_lowercase());
-        }
-    }
-    let state = |rig: &Rig| results::pose(rig.harness.state().state(), MEASURED).ready().is_some();
-    assert!(!state(&rig));
-    let tool = results::tool_name(rig.harness.state().state()).unwrap().to_owned();
+    rig.send(prefer(|s| s.workspace = Workspace::Align));
+    let posed = |rig: &Rig| results::pose(rig.state(), MEASURED).ready().is_some();
+    assert!(!posed(&rig));
+    let tool = results::tool_name(rig.state()).unwrap().to_owned();
     // One offer for both sides.
     assert_eq!(rig.harness.query_all_by_label_contains("as millimeters, ").count(), 1);
     let unit = folder.join("unit.txt");
     assert!(!unit.exists());
-    rig.harness.get_by_label(&format!("Read {tool} as millimeters, measured")).click();
-    rig.harness.step();
-    rig.settle();
+    rig.click(&format!("Read {tool} as millimeters, measured"));
     assert_eq!(std::fs::read_to_string(&unit).unwrap(), "mm\n");
-    assert!(state(&rig), "{:?}", results::pose(rig.harness.state().state(), MEASURED));
+    assert!(posed(&rig), "{:?}", results::pose(rig.state(), MEASURED));
     assert!(rig.harness.query_all_by_label_contains("as millimeters").next().is_none());
-    rig.shoot("unit-accepted");
 
     // Somebody else wrote another unit meanwhile: it is not lost unsaid.
     std::fs::write(&unit, "in").unwrap();
     let (unit_now, replacing) = (ToolUnit::Millimeters, Some("mm".to_owned()));
     rig.send(Command::Library(LibraryCommand::ReadToolAs { tool, unit: unit_now, replacing }));
     assert_eq!(std::fs::read_to_string(&unit).unwrap(), "in");
-    let log = &rig.harness.state().state().log;
+    let log = &rig.state().log;
     assert!(
         log.entries.iter().any(|entry| entry.level == Level::Error && entry.detail.as_ref().unwrap().contains("in"))
     );
     // What is read anew says so, and the offer names what it would replace.
     rig.send(LibraryCommand::Reload);
-    let Lookup::Failed(err) = results::pose(rig.harness.state().state(), MEASURED) else {
-        panic!("it is no tool in inches")
-    };
+    let Lookup::Failed(err) = results::pose(rig.state(), MEASURED) else { panic!("it is no tool in inches") };
     assert_eq!(err.units.as_ref().unwrap().says.as_deref(), Some("in"));
 }

@@ -21,9 +21,7 @@ impl Rig {
     /// Flags the pair by hand.
     fn flag(&mut self) {
         for label in ["Review state", "flagged"] {
-            self.harness.get_by_label(label).click();
-            self.harness.step();
-            self.settle();
+            self.click(label);
         }
     }
 
@@ -45,13 +43,12 @@ impl Rig {
     }
 
     fn question(&self) -> Option<Question> {
-        self.harness.state().state().document.question
+        self.state().document.question
     }
 }
 
 /// Flags a pair whose labels cannot be written, by root neither: a file lies where their folder should be.
 fn stick(rig: &mut Rig) {
-    rig.send(prefer(|s| s.hint_dismissed = true));
     rig.send(prefer(|s| s.workspace = Workspace::Label));
     std::fs::write(rig.data.join(FOLDER), "in the way").unwrap();
     rig.flag();
@@ -128,7 +125,7 @@ fn labels_go_elsewhere_or_nowhere_and_are_kept_where_nobody_was_asked() {
 fn a_lost_graphics_device_closes_the_window_unasked_with_everything_kept() {
     let Some(mut rig) = Rig::new(SIZE, 1) else { return };
     stick(&mut rig);
-    let pair = rig.harness.state().state().pair_name().to_owned();
+    let pair = rig.state().pair_name().to_owned();
     rig.harness.state().loss().say("the driver crashed");
     let answers = rig.step_answering();
     assert!(

@@ -163,7 +163,7 @@ impl FromStr for Registration {
         let (key, rest) = text.split_once(':').map_or((text, None), |(key, rest)| (key, Some(rest)));
         let by = Self::iter().find(|by| by.key() == key).ok_or_else(|| {
             let keys: Vec<_> = Self::iter().map(Self::key).collect();
-            format!("{key:?} is no registration; there are {}", keys.join(", "))
+            format!("unknown registration {key:?}; choose from {}", keys.join(", "))
         })?;
         let Some(rest) = rest else { return Ok(by) };
         if let Some(range) = rest.strip_prefix("range=") {

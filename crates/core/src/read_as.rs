@@ -227,7 +227,7 @@ impl FromStr for ReadAs {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let unknown = || format!("{:?} is no way to read data: there are {KEYS}", clip(text));
+        let unknown = || format!("unknown way to read data {:?}; choose from {KEYS}", clip(text));
         let (key, value) = text.split_once('=').map_or((text, None), |(key, value)| (key, Some(value)));
         let (bare, depths) = key.strip_prefix("whole-").map_or((key, Depths::Imprints), |bare| (bare, Depths::Whole));
         let factor = || {

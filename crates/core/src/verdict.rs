@@ -190,7 +190,7 @@ impl Verdict {
 fn fits(evidence: &Evidence) -> String {
     let on = format!("{:.0} % of the contact lies on the tool", 100.0 * evidence.on_tool);
     match evidence.membrane {
-        Some(membrane) => format!("{on}, the membrane's relief is like the tool's ({:.2})", membrane.likeness),
+        Some(membrane) => format!("{on}, the membrane has the tool's shape (similarity {:.2})", membrane.likeness),
         None => on,
     }
 }
@@ -207,7 +207,7 @@ fn signs(report: &AlignReport, evidence: &Evidence, place_m: f64) -> Vec<Sign> {
     if let Some(other) = report.answers.iter().find(|answer| !answer.alike).filter(|_| own < LIKELIEST) {
         let off = PoseDifference::between(report.grasp_from_object, other.grasp_from_object);
         let (turned, moved) = (units::text_deg(off.angle_rad), units::text_mm(off.position_m));
-        sign(Several, Grade::Check, format!("another pose fits as well: {turned} and {moved} from here"));
+        sign(Several, Grade::Check, format!("another pose fits as well, {turned} and {moved} away"));
     }
     let off = 1.0 - evidence.on_tool;
     let percent = |share: f64| format!("{:.0} %", 100.0 * share);
@@ -230,18 +230,18 @@ fn signs(report: &AlignReport, evidence: &Evidence, place_m: f64) -> Vec<Sign> {
             let what = format!("the fingers do not agree: they are {} apart", way(fingers));
             sign(Fingers, Grade::of(fingers.gain, limits.fingers).min(apart), what);
         }
-        let what = format!("the membranes fit better {} from here: look at the mask", way(membrane.own));
+        let what = format!("the membranes fit better {} away: check the mask", way(membrane.own));
         sign(Elsewhere, Grade::of(membrane.own.gain, limits.elsewhere), what);
         let grade = Grade::of(1.0 - membrane.likeness + OFF_COUNTS * off.min(OFF_CAP), limits.misfit);
         let (likeness, off) = (membrane.likeness, percent(off));
-        let what = format!("the contact is not like this tool's (likeness {likeness:.2}, {off} of it off the tool)");
+        let what = format!("the contact does not match this tool (similarity {likeness:.2}, {off} of it off the tool)");
         sign(Misfit, grade, what);
     }
-    sign(OffTool, Grade::of(off, OFF), format!("{} of the contact mask lie off the tool", percent(off)));
+    sign(OffTool, Grade::of(off, OFF), format!("{} of the contact mask lies off the tool", percent(off)));
     let angle_rad = evidence.uncertainty.angle_rad();
-    let what = format!("the contact leaves the angle open (±{})", units::text_deg(angle_rad));
+    let what = format!("the contact does not determine the angle (±{})", units::text_deg(angle_rad));
     sign(AngleOpen, Grade::of(angle_rad, limits.angle_rad), what);
-    let what = format!("the contact leaves the place open (±{})", units::text_mm(place_m));
+    let what = format!("the contact does not determine the position (±{})", units::text_mm(place_m));
     sign(PlaceOpen, Grade::of(place_m, PLACE_SD_M), what);
     if let Some(fit) = report.joint.filter(|fit| !fit.basis.has_membrane()) {
         sign(MaskAlone, Grade::Check, fit.basis.to_string());

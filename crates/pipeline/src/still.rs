@@ -70,16 +70,22 @@ impl StillSetup {
         let fail = |why: String, hint: &str| Err(TaskError::new(WHAT, why).with_hint(hint));
         if !WIDTHS_PX.contains(&self.width_px) {
             let (lo, hi) = (WIDTHS_PX.start(), WIDTHS_PX.end());
-            return fail(format!("{} pixels are no width", self.width_px), &format!("Choose {lo} to {hi} pixels."));
+            return fail(
+                format!("a picture cannot be {} pixels wide", self.width_px),
+                &format!("Choose {lo} to {hi} pixels."),
+            );
         }
         if self.turntable.is_some_and(|frames| frames == 0 || frames > MOST_FRAMES) {
-            return fail("a turntable of so many frames cannot be".into(), "Choose 1 to 3600 frames.");
+            return fail("a turntable cannot have so many frames".into(), "Choose 1 to 3600 frames.");
         }
         if self.distance_m.is_some_and(|reach| !DISTANCES_M.contains(&reach)) {
-            return fail("the colors of distances cannot end there".into(), "Choose 0.01 to 50 mm.");
+            return fail("distance colors cannot end there".into(), "Choose 0.01 to 50 mm.");
         }
         if !(self.angles.yaw_deg.is_finite() && self.angles.pitch_deg.abs() <= 90.0) {
-            return fail("the view is no direction".into(), "Choose two numbers, the second from -90 to 90 degrees.");
+            return fail(
+                "the view is not a direction".into(),
+                "Choose two numbers, the second from -90 to 90 degrees.",
+            );
         }
         Ok(())
     }

@@ -46,7 +46,7 @@ pub(in crate::headless) fn parse_start(text: &str) -> Result<PlanarPose, String>
         return Err("three numbers are needed: degrees, millimeters along y, millimeters along z".to_owned());
     };
     if degrees.abs() > MAX_DEG || y_mm.abs() > MAX_MM || z_mm.abs() > MAX_MM {
-        return Err(format!("no hand holds a tool so: at most {MAX_DEG} degrees and {MAX_MM} mm either way"));
+        return Err(format!("out of range: at most {MAX_DEG} degrees and {MAX_MM} mm either way"));
     }
     Ok(PlanarPose { theta_rad: degrees.to_radians(), y_m: y_mm * 1e-3, z_m: z_mm * 1e-3 })
 }

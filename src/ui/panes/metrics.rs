@@ -180,9 +180,11 @@ fn comparison(cx: &mut Cx<'_>, ui: &mut Ui) {
     let fingers = cx.state.rig().pads().filter(|f| cx.state.fingers().contains(f));
     for finger in fingers {
         // What it was made with stands under the image; here only that it is not what would be made now.
-        if let Some(outdated) = results::outdated(cx.state, finger) {
+        if let Some(recipe) =
+            results::chosen(cx.state, finger).filter(|_| results::outdated(cx.state, finger).is_some())
+        {
             let text = RichText::new("Made with other settings").size(SMALL).color(cx.p.caution);
-            ui.label(text).on_hover_text(outdated.made_with);
+            ui.label(text).on_hover_text(cx.state.library.made_with(recipe));
         }
         match results::comparison(cx.state, finger) {
             Lookup::Ready(c) | Lookup::Stale(c) => {

@@ -35,25 +35,23 @@ pub(in crate::agreement) fn every_step_of_a_registration_is_the_same_in_the_time
     for mut both in with_poses(home.path()) {
         let mut count = 0;
         both.show(&[Pane::Steps, Pane::Predicted]);
-        for at in 0..2 {
-            let recipe = draws.posed();
-            both.predict(&recipe, 17 * at);
-            for source in ImprintSource::iter() {
-                both.studio.send(InspectCommand::Source(source).into());
-                // From the registration's own starts, and from one of a person.
-                let by_hand = PlanarPose { theta_rad: 10f64.to_radians(), y_m: -1.5e-3, z_m: 2e-3 };
-                for start in [None, Some(by_hand)] {
-                    both.studio.send(InspectCommand::Start(start).into());
-                    let what = format!("{} {source:?} {start:?}, {recipe:?}", both.studio.state.pair_name());
-                    let said = both.said(Pane::Steps);
-                    let shown = results::inspection(&both.studio.state);
-                    let Lookup::Ready(found) = shown else {
-                        same_reason(shown, said, &what);
-                        continue;
-                    };
-                    let said = said.unwrap_or_else(|err| panic!("{what}: {err}"));
-                    count += same(&written(found.report()), &said["cases"][0]["report"], &what);
-                }
+        let recipe = draws.posed();
+        both.predict(&recipe, 17);
+        for source in ImprintSource::iter() {
+            both.studio.send(InspectCommand::Source(source).into());
+            // From the registration's own starts, and from one of a person.
+            let by_hand = PlanarPose { theta_rad: 10f64.to_radians(), y_m: -1.5e-3, z_m: 2e-3 };
+            for start in [None, Some(by_hand)] {
+                both.studio.send(InspectCommand::Start(start).into());
+                let what = format!("{} {source:?} {start:?}, {recipe:?}", both.studio.state.pair_name());
+                let said = both.said(Pane::Steps);
+                let shown = results::inspection(&both.studio.state);
+                let Lookup::Ready(found) = shown else {
+                    same_reason(shown, said, &what);
+                    continue;
+                };
+                let said = said.unwrap_or_else(|err| panic!("{what}: {err}"));
+                count += same(&written(found.report()), &said["cases"][0]["report"], &what);
             }
         }
         counts.push(count);

@@ -63,7 +63,7 @@ pub enum Basis {
     NoZone,
     /// The mask alone, because the prediction is no membrane that the tool could make: the generator learned another one, or
     /// another pressure.
-    #[strum(to_string = "mask alone: the predicted membrane is none that this tool makes at this pressure")]
+    #[strum(to_string = "mask alone: no press of this tool gives the predicted membrane")]
     Unlike,
     /// The mask alone, because the tool hardly shows in the membrane.
     #[strum(to_string = "mask alone: too little of the membrane lies on the tool")]

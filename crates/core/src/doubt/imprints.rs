@@ -170,7 +170,7 @@ pub(super) fn judge(
     }
     let unexplained = || {
         let what = format!(
-            "the imprints do not lie on their CAD models at the true poses (likeness {mean:.2} in {}, where sound data have 0.6), \
+            "the imprints do not lie on their CAD models at the true poses (similarity {mean:.2} in {}, where sound data have 0.6), \
              and nothing that was tried explains it",
             counted(stored.len(), "pair")
         );
@@ -191,7 +191,7 @@ fn one_model(pairs: &Pairs<'_>, doubted: &[(&str, f64)], stored: &[f64]) -> Opti
     let said: Vec<String> = bad.iter().map(|(tool, score)| format!("{tool} {score:.2}")).collect();
     let names: Vec<String> = bad.iter().map(|(tool, _)| (*tool).to_owned()).collect();
     let what = format!(
-        "the imprints of {} do not lie on their CAD models, where those of the others do (likeness {}): none of the other models \
+        "the imprints of {} do not lie on their CAD models, where those of the others do (similarity {}): none of the other models \
          fits either",
         counted(bad.len(), "tool"),
         said.join(", ")
@@ -223,7 +223,7 @@ fn cameras_moved(pairs: &Pairs<'_>, stored: &[f64], read_as: ReadAs, gain: &Gain
     let (forward_m, rival) = CAMERAS_M.map(score).into_iter().max_by(|(_, a), (_, b)| a.read.total_cmp(&b.read))?;
     (rival.explains(LIES_ON, CLEARLY) && rival.read >= gain.read - SAME).then(|| {
         let what = format!(
-            "the imprints lie off their CAD models: with the depth cameras {:.0} mm further {} they have a likeness of {:.2} \
+            "the imprints lie off their CAD models: with the depth cameras {:.0} mm further {} they have a similarity of {:.2} \
              instead of {:.2}; that {} would explain it no better",
             1e3 * forward_m.abs(),
             if forward_m > 0.0 { "forward" } else { "back" },
@@ -266,7 +266,7 @@ fn figures(pairs: &Pairs<'_>, stored: &[f64], read_as: ReadAs, gain: &Gain) -> S
     };
     let mean = stored.iter().sum::<f64>() / stored.len().max(1) as f64;
     format!(
-        "{angles} imprints lie on their CAD models with a likeness of {:.2} instead of {mean:.2}, better on {} of {}",
+        "{angles} imprints lie on their CAD models with a similarity of {:.2} instead of {mean:.2}, better on {} of {}",
         gain.read,
         gain.better,
         counted(stored.len(), "pair")
@@ -317,7 +317,7 @@ fn of_models(
     }
     let list: Vec<(String, String)> =
         others.iter().map(|(tool, other, _)| ((*tool).to_owned(), (*other).to_owned())).collect();
-    let said: Vec<String> = list.iter().map(|(tool, other)| format!("{tool} was felt as {other}")).collect();
+    let said: Vec<String> = list.iter().map(|(tool, other)| format!("{tool} looks like {other}")).collect();
     let what = format!(
         "the CAD models of {} are those of other tools ({}): with the others the imprints lie on them with a likeness of \
          {by_others:.2} instead of {mean:.2}",
@@ -353,7 +353,7 @@ fn other_models_of_some(pairs: &Pairs<'_>, stored: &[f64]) -> Option<Doubt> {
         let scores = others.map(|(other, field)| (*other, Pairs::score(sample, field)));
         let best = scores.max_by(|(_, a), (_, b)| a.total_cmp(b));
         if let Some((other, _)) = best.filter(|(_, score)| *score >= LIES_ON && score - as_is >= CLEARLY_OF_TOOL) {
-            found.push((*at, format!("{tool} was felt as {other}")));
+            found.push((*at, format!("{tool} looks like {other}")));
         }
     }
     if found.len() < SOME {

@@ -71,7 +71,7 @@ pub(super) fn of_fingers(
     let touched = wrong.touched();
     if (touched as f64) < STILL_RIGHT * wrong.tried as f64 {
         let what = format!(
-            "the {name} felt something in {touched} of {}, the {other} in {}",
+            "the {name} has contact in {touched} of {}, the {other} in {}",
             counted(wrong.tried, "pair"),
             sound.touched()
         );

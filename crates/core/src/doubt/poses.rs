@@ -354,7 +354,7 @@ impl<'m, 'a> Registered<'m, 'a> {
 /// Imprints and CAD models do not go together, and it is not known why.
 fn no_cure(figures: &str) -> Doubt {
     let what =
-        format!("the imprints do not lie well on their CAD models: {figures}, and nothing that was tried mends it");
+        format!("the imprints do not lie well on their CAD models: {figures}, and nothing that was tried fixes it");
     Doubt::new(
         Cause::Unexplained,
         what,

@@ -56,7 +56,7 @@ pub(super) fn judge(samples: &[Sample], sound: bool, predict: Predict<'_>) -> Op
         return swapped_in_some(&stored, &swapped, &at);
     };
     let figures = format!(
-        "predictions look like the measured imprints with a likeness of {:.2} instead of {mean:.2}, better on {} of {}",
+        "predictions look like the measured imprints with a similarity of {:.2} instead of {mean:.2}, better on {} of {}",
         gain.read,
         gain.better,
         counted(stored.len(), "pair")

@@ -73,14 +73,14 @@ impl FromStr for CleanUp {
         let (kind, size) = text.split_once('=').map_or((text, None), |(kind, size)| (kind, Some(size)));
         let kinds = || CleanKind::iter().map(CleanKind::key).collect::<Vec<_>>().join(", ");
         let kind: CleanKind =
-            kind.parse().map_err(|_| format!("there is no clean-up \"{kind}\"; there are {}", kinds()))?;
+            kind.parse().map_err(|_| format!("unknown clean-up \"{kind}\"; choose from {}", kinds()))?;
         let size_mm = match (kind.is_sized(), size) {
             (false, None) => 0.0,
             (false, Some(_)) => return Err(format!("{} has no size", kind.key())),
             (true, None) => return Err(format!("{} takes a size in millimeters, such as {0}=1.5", kind.key())),
             (true, Some(size)) => match size.parse() {
                 Ok(mm) if (0.0..=1e3).contains(&mm) => mm,
-                _ => return Err(format!("\"{size}\" is no size in millimeters (0 to 1000)")),
+                _ => return Err(format!("\"{size}\" is not a size in millimeters (0 to 1000)")),
             },
         };
         Ok(Self { kind, size_mm })

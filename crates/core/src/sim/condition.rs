@@ -20,7 +20,7 @@ const NOISE_STD: [f32; 3] = [0.5 * 0.0687 * 255.0, 0.5 * 0.0428 * 255.0, 0.5 * 0
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
 pub enum Condition {
-    /// Nothing: both sensors felt the same grasp of the pattern.
+    /// Nothing: both sensors measured the same grasp of the pattern.
     #[default]
     Plain,
     /// The GelSlims closed on the bare shaft of the tool: they see nothing of its pattern.
@@ -42,7 +42,7 @@ impl Condition {
     /// Meaning of the condition, in one line.
     pub fn description(self) -> &'static str {
         match self {
-            Self::Plain => "both sensors felt the same grasp of the pattern",
+            Self::Plain => "both sensors measured the same grasp of the pattern",
             Self::Ambiguous => "the GelSlims closed on the bare shaft of the tool and see nothing of its pattern",
             Self::Mixed => "every other pair is ambiguous (bare shaft), the rest plain",
             Self::Misaligned => "the bubbles grasped up to 8 mm away along y and z from where the GelSlims did",

@@ -34,9 +34,9 @@ impl Fault {
     pub fn what(self) -> &'static str {
         match self {
             Self::WrongCad => "the CAD model is another tool's",
-            Self::BlobInMask => "a foreign body beside the tool is felt too",
-            Self::BlankFinger => "the left bubble felt nothing",
-            Self::StraightRod => "a straight rod: its place along itself cannot be felt",
+            Self::BlobInMask => "a foreign body beside the tool is in contact too",
+            Self::BlankFinger => "the left bubble measured no contact",
+            Self::StraightRod => "a straight rod: its position along its axis cannot be measured",
             Self::StlInMillimeters => "the CAD model is in millimeters",
         }
     }

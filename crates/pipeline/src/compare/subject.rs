@@ -172,7 +172,7 @@ impl FromStr for Subject {
                 }
                 "shift" => change.shift = Some(SHIFTS.iter().find(|(name, _)| *name == value).ok_or_else(wrong)?.1),
                 "seeds" => seeds = Some(value.parse().ok().filter(|n| SEEDS.contains(n)).ok_or_else(wrong)?),
-                _ => return Err(format!("{key} is none of bundle, seed, steps, shift, seeds")),
+                _ => return Err(format!("unknown {key}; choose from bundle, seed, steps, shift, seeds")),
             }
         }
         let nothing_else = change == RecipeChange::default() && seeds.is_none();
@@ -182,7 +182,7 @@ impl FromStr for Subject {
             "prediction" if seeds.is_none() => Ok(Self::Predicted(change)),
             "mean" => Ok(Self::Mean(change, seeds.unwrap_or(8))),
             "measured" | "stored" | "prediction" => Err(format!("{name} has no such choice: {rest}")),
-            _ => Err(format!("\"{name}\" is none of measured, prediction, mean, stored")),
+            _ => Err(format!("unknown side \"{name}\"; choose from measured, prediction, mean, stored")),
         }
     }
 }

@@ -123,7 +123,7 @@ impl FromStr for EngineChoice {
     fn from_str(text: &str) -> Result<Self, String> {
         Self::all().find(|choice| choice.key() == text).ok_or_else(|| {
             let keys: Vec<&str> = Self::all().map(Self::key).collect();
-            format!("no engine is called \"{text}\"; there are {}", keys.join(", "))
+            format!("unknown engine \"{text}\"; choose from {}", keys.join(", "))
         })
     }
 }

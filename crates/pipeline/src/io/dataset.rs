@@ -390,7 +390,7 @@ fn most_invalid(file: &Path, bad: usize, all: usize, what: impl FnOnce() -> Stri
     if share > MOST_INVALID {
         let (percent, what) = (100.0 * share, what());
         let what =
-            format!("{percent:.0} % of the {what} are no measurement (NaN, infinite or depth 0): too few are left");
+            format!("{percent:.0} % of the {what} have no measurement (NaN, infinite or depth 0): too few are left");
         let hint = "record the grasp again, or remove the file";
         return Err(FileError::new(file, what, hint).of_kind(FileErrorKind::Content));
     }

@@ -171,7 +171,7 @@ pub fn read_dict(path: &Path) -> Result<PtDict, FileError> {
     }
     let mut head = [0; 2];
     if opened.read_exact(&mut head).is_err() || &head != b"PK" {
-        return Err(not_a_dict("no zip archive as PyTorch 1.6 and newer write"));
+        return Err(not_a_dict("not a zip archive as PyTorch 1.6 and newer write"));
     }
     // From its beginning: else all of a large file is searched for what stands in front of it.
     let config = Config { archive_offset: ArchiveOffset::Known(0) };
@@ -186,7 +186,7 @@ pub fn read_dict(path: &Path) -> Result<PtDict, FileError> {
         return Err(too_large(path, &format!("its list of contents is longer than {MAX_PICKLE} bytes")));
     }
     let items = contents(&pickle).map_err(|refusal| match refusal {
-        Refusal::NoDict => not_a_dict("its list of contents is no dict that torch.save writes"),
+        Refusal::NoDict => not_a_dict("its list of contents is not a dict as torch.save writes it"),
         Refusal::TooLarge(reason) => too_large(path, &reason),
     })?;
     let root = name.trim_end_matches("data.pkl").to_owned();

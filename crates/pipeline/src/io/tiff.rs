@@ -37,7 +37,7 @@ pub(crate) fn read(file: &Path) -> Result<Gray, FileError> {
 }
 
 fn decode(bytes: Vec<u8>) -> Result<Gray, String> {
-    let fail = |err: tiff::TiffError| format!("no TIFF that can be read ({err})");
+    let fail = |err: tiff::TiffError| format!("not a readable TIFF ({err})");
     let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(fail)?;
     let (width, height) = decoder.dimensions().map_err(fail)?;
     if width.max(height) > MAX_SIDE || width.min(height) == 0 {

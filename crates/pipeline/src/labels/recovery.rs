@@ -187,7 +187,7 @@ pub fn take_in(dataset: &Dataset, labels: &Labels, folder: &Path) -> Result<Reco
     for Pair { name } in &manifest.pairs {
         let one = || {
             if !dataset.index.pairs.iter().any(|entry| entry.name == *name) {
-                return Err(TaskError::new(&what, format!("{name} is no pair of this data set")));
+                return Err(TaskError::new(&what, format!("{name} is not a pair of this data set")));
             }
             take_in_pair(labels, &all, name)
         };

@@ -69,8 +69,9 @@ pub fn statistics(
             let added = models
                 .predict(generating.bundle, generating.engine, generating.config, &[input], &quiet)
                 .and_then(|predictions| {
-                    let prediction =
-                        predictions.first().ok_or_else(|| TaskError::new(WHAT, "the generator gave none"))?;
+                    let prediction = predictions
+                        .first()
+                        .ok_or_else(|| TaskError::new(WHAT, "the generator returned no prediction"))?;
                     let chain = crate::steps::imprint::chain(prediction, ShiftMode::Raw)?;
                     engine.clone_from(&prediction.engine);
                     fit.add(&chain, &prediction.raw, &bubble.imprint).map_err(|err| TaskError::from_error(WHAT, &err))

@@ -208,7 +208,7 @@ impl Models {
         };
         let one = |wanted: &GenerateInput<'_>| {
             let made = run(std::slice::from_ref(wanted))?.pop();
-            made.ok_or_else(|| TaskError::new(what(), "the generator gave no prediction"))
+            made.ok_or_else(|| TaskError::new(what(), "the generator returned no prediction"))
         };
         let made = match run(wanted) {
             Ok(made) => made.into_iter().map(Ok).collect(),
@@ -319,7 +319,7 @@ impl Models {
         let item = |seed| GenerateInput { difference: &blank, seed, size: [0, 0] };
         let both = [item(config.seed), item(config.seed.wrapping_add(1))];
         let made = self.make(None, bundle, engine, config, &both, &JobCx::unwatched())?.pop();
-        made.ok_or_else(|| TaskError::new(format!("Generate with {}", bundle.name), "the model gave no answer"))
+        made.ok_or_else(|| TaskError::new(format!("Generate with {}", bundle.name), "the model returned nothing"))
     }
 
     /// Predictions of an image that were made before and are kept on the disk, oldest first, as far as their bundle is

@@ -32,10 +32,10 @@ impl Generating<'_> {
     /// The sensor that it starts from.
     ///
     /// # Errors
-    /// If the bundle is no generator, or not one of the sensors of `rig`.
+    /// If the bundle is not a generator, or not one of the sensors of `rig`.
     pub fn input(self, rig: &Rig) -> Result<SensorId, TaskError> {
         let what = || format!("Generate with {}", self.bundle.name);
-        let ends = self.bundle.ends(rig).ok_or_else(|| TaskError::new(what(), "the bundle is no generator"))?;
+        let ends = self.bundle.ends(rig).ok_or_else(|| TaskError::new(what(), "the bundle is not a generator"))?;
         Ok(ends.map_err(|err| TaskError::from_error(what(), &err))?.input)
     }
 

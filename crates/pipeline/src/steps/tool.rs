@@ -93,7 +93,7 @@ pub fn set_unit(dataset: &Dataset, tool: &str, unit: ToolUnit, replacing: Option
         } else {
             format!("It fits in {}.", others.join(", "))
         };
-        return Err(fail("the model is then no tool: those are 4 mm to 0.4 m long".into()).with_hint(hint));
+        return Err(fail("the model is then not a tool: tools are 4 mm to 0.4 m long".into()).with_hint(hint));
     }
     let file = model.with_file_name(UNIT_FILE);
     let word = word_for(&model, unit).ok_or_else(|| {

@@ -39,7 +39,7 @@ pub(super) fn with_the_processor(bundle: &Bundle, engine: EngineKind) -> Result<
         log::debug!("the graph `{}` on {}: differs by {share:.1e}", role.key(), engine.label());
         if share > provider.tolerance() {
             return Err(format!(
-                "the graph `{}` comes out otherwise than on the processor, by {:.2} % of its largest value (at most {:.1} % \
+                "the graph `{}` differs from the processor by {:.2} % of its largest value (at most {:.1} % \
                  is taken)",
                 role.key(),
                 100.0 * share,

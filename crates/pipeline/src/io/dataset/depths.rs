@@ -360,14 +360,14 @@ pub(super) fn assumed_camera(rig: &Rig, finger: PadId) -> Option<DepthCamera> {
 /// The true pose of a touch, where the file says one.
 fn pose(rows: &PtDict, at: usize, of: usize, notes: &mut Vec<Problem>) -> Result<Option<PlanarPose>, FileError> {
     if !rows.has(POSE) {
-        let what = format!("no key \"{POSE}\": this file says no true pose");
+        let what = format!("no key \"{POSE}\": this file has no true pose");
         notes.push(problem(rows.file(), what, "save the poses if angle errors are wanted"));
         return Ok(None);
     }
     let row = rows.row(POSE, at, of, &[3])?.into_f64();
     let [y, z, theta_rad] = row[..] else { return Ok(None) };
     if !row.iter().all(|v| v.is_finite()) {
-        let what = format!("key \"{POSE}\", row {at} is {row:?}: it says no true pose");
+        let what = format!("key \"{POSE}\", row {at} is {row:?}: it is not a true pose");
         notes.push(problem(rows.file(), what, "write the file again"));
         return Ok(None);
     }

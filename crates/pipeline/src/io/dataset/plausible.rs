@@ -51,7 +51,7 @@ pub(super) fn notes_of(loaded: &mut Loaded, file: &Path, key: &str, with_cameras
             problems.push(problem(
                 file,
                 format!(
-                    "key \"{key}\": {share:.2} % of the {name} finger's pixels are no measurement ({nan} NaN, \
+                    "key \"{key}\": {share:.2} % of the {name} finger's pixels have no measurement ({nan} NaN, \
                      {infinite} infinite, {dropped} at depth 0)"
                 ),
                 "these pixels are left out everywhere; record the grasp again if they cover the contact",

@@ -22,7 +22,7 @@ const MAX_BYTES: u64 = 4096;
 pub(super) fn of(root: &Path) -> Result<Vec<ReadAs>, FileError> {
     let file = root.join(READ_AS_FILE);
     let bad = |reason: String| {
-        let what = format!("how the data are to be read is not understood: {reason}");
+        let what = format!("cannot understand how the data are to be read: {reason}");
         FileError::new(&file, what, "correct that file, or remove it to read the data as they are stored")
     };
     match files::read_to_string(&file, MAX_BYTES) {

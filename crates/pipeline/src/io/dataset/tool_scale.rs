@@ -77,7 +77,7 @@ impl FromStr for ToolUnit {
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         Self::iter()
             .find(|unit| unit.key() == text)
-            .ok_or_else(|| format!("{:?} is no unit: use m, cm, mm, um or in", files::clip(text)))
+            .ok_or_else(|| format!("unknown unit {:?}: use m, cm, mm, um or in", files::clip(text)))
     }
 }
 
@@ -108,7 +108,7 @@ impl FromStr for ToolScale {
                 Ok(factor) if factor.is_finite() && factor > 0.0 => Self::Factor(factor),
                 _ => {
                     return Err(format!(
-                        "{:?} is no unit: use m, cm, mm, um, in, auto or a factor to meters",
+                        "unknown unit {:?}: use m, cm, mm, um, in, auto or a factor to meters",
                         files::clip(other)
                     ));
                 }
@@ -187,7 +187,7 @@ pub(crate) fn read_tool(path: &Path, scale: Option<ToolScale>) -> Result<ToolFil
     let not_a_tool = |unit: String| {
         let hint =
             "tools are 4 mm to 0.4 m long: name the right unit in unit.txt beside the model, or export the model again";
-        wrong(format!(": that is no tool {unit}"), hint)
+        wrong(format!(": that is not a tool {unit}"), hint)
     };
     let factor = match (scale, fitting) {
         (ToolScale::Factor(factor), _) if is_tool_length(size * factor) => factor,

@@ -102,7 +102,7 @@ fn recognized(path: &Path) -> Result<Format, FileError> {
         return match path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("png")) {
             true if path.parent().is_some_and(|folder| folder.ends_with("masks")) => Ok(Format::Unet),
             true => Ok(Format::Png),
-            false => Err(FileError::new(path, "this is no file of masks", "name a .png")),
+            false => Err(FileError::new(path, "this is not a mask file", "name a .png")),
         };
     }
     // Images lie in folders of their own: pictures are masks only where nothing else is.

@@ -87,7 +87,7 @@ pub(super) fn gather(
         .generating()?
         .bundle
         .ends(&dataset.rig)
-        .ok_or_else(|| TaskError::new(WHAT, "the bundle is no generator"))?;
+        .ok_or_else(|| TaskError::new(WHAT, "the bundle is not a generator"))?;
     let input = ends.map_err(|err| TaskError::from_error(WHAT, &err))?.input;
     let (mut touches, mut left_out) = (Vec::new(), Vec::new());
     let mut notes = Findings::default();

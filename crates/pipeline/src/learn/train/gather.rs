@@ -237,6 +237,6 @@ fn imprint(
     let wanted = GenerateInput { difference: &picture, seed: config.seed, size: [0, 0] };
     let quiet = JobCx::new(cx.cancel.clone(), std::sync::Arc::new(|_| {}));
     let made = models.predict(generator, setup.engine, &config, &[wanted], &quiet)?.pop();
-    let made = made.ok_or_else(|| TaskError::new(WHAT, "the generator gave no prediction"))?;
+    let made = made.ok_or_else(|| TaskError::new(WHAT, "the generator returned no prediction"))?;
     imprint_of(&made, shift, sample, place.pad)
 }

@@ -152,7 +152,7 @@ fn fail(err: Error) -> TaskError {
 /// The mask model that it begins from.
 fn open(setup: &TrainSetup) -> Result<(MaskSpec, MaskStart), TaskError> {
     let bundle = setup.start.open(WHAT)?;
-    let no = || TaskError::new(WHAT, format!("{} is no mask model ({})", setup.start.name, setup.start.origin));
+    let no = || TaskError::new(WHAT, format!("{} is not a mask model ({})", setup.start.name, setup.start.origin));
     let (spec, file) = (bundle.mask_unet().ok_or_else(no)?.clone(), bundle.file(Role::MaskUnet).ok_or_else(no)?);
     let file = file.read(files::MODEL).map_err(|err| TaskError::new(WHAT, err))?.into_owned();
     let cast = match spec.input.cast {

@@ -49,7 +49,7 @@ impl GeneratorChoice {
 
     /// The bundle's defaults with what is said instead.
     fn config(&self, bundle: &BundleInfo) -> Result<GenerateConfig, TaskError> {
-        let no_generator = || TaskError::new(WHAT, format!("the bundle {} is no generator", bundle.name));
+        let no_generator = || TaskError::new(WHAT, format!("the bundle {} is not a generator", bundle.name));
         let info = bundle.generator.as_ref().ok_or_else(no_generator)?;
         let preset = self.preset.config(info.defaults, info.training_steps);
         Ok(GenerateConfig {

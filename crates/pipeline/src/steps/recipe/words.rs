@@ -134,7 +134,7 @@ impl FromStr for ShiftChoice {
                 let part = |name: &str| {
                     name.trim().parse::<CorrectionPart>().map_err(|_| {
                         let names: Vec<&str> = CorrectionPart::iter().map(Into::into).collect();
-                        format!("\"{name}\" is no part of a fit; there are {}", names.join(", "))
+                        format!("unknown part of a fit \"{name}\"; choose from {}", names.join(", "))
                     })
                 };
                 Self::Exact(parts.split(',').map(part).collect::<Result<Vec<_>, _>>()?.into())
@@ -143,7 +143,7 @@ impl FromStr for ShiftChoice {
             _ if text == "refit" => {
                 return Err("its statistics are needed: refit:FILE; make the file with `touch2touch stats`".into());
             }
-            _ => return Err("it is none of exact, exact:none, exact:PART,PART, paper, raw and refit:FILE".into()),
+            _ => return Err("it must be exact, exact:none, exact:PART,PART, paper, raw or refit:FILE".into()),
         })
     }
 }
@@ -178,7 +178,7 @@ impl FromStr for MaskChoice {
         let (key, numbers) = text.split_once(':').unwrap_or((text, ""));
         let source = key.parse().map_err(|_| {
             let keys: Vec<&str> = MaskSource::iter().map(MaskSource::key).collect();
-            format!("{key:?} is no source of masks; there are {}", keys.join(", "))
+            format!("unknown mask source {key:?}; choose from {}", keys.join(", "))
         })?;
         let mut choice = Self { source, ..Self::default() };
         for part in numbers.split(',').filter(|part| !part.is_empty()) {

@@ -153,7 +153,7 @@ fn what_is_wrong_is_said_with_its_file() {
         (DEPTHS[0], None, "there is no measured imprint"),
         (UNTOUCHED, None, "there is no GelSlim difference"),
         (POSE, None, "no true pose"),
-        (POSE, nan(1), "it says no true pose"),
+        (POSE, nan(1), "it is not a true pose"),
         (WIDTHS, None, "10 mm apart"),
         (DEPTHS[0], depths(0.5), "the depths are positive"),
         (DEPTHS[0], depths(-0.001), "meters?"),

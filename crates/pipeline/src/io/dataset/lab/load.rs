@@ -81,7 +81,7 @@ fn optional<T>(
 }
 
 fn pose(dict: &PtDict, notes: &mut Vec<Problem>) -> Result<Option<[f64; 3]>, FileError> {
-    let without = "this file says no true pose";
+    let without = "this file has no true pose";
     let mut values = [0.0; 3];
     for (value, key) in values.iter_mut().zip(["theta", "x", "y"]) {
         match optional(dict, dict.scalar(key), without, notes)? {
@@ -215,8 +215,10 @@ fn cameras(dict: &PtDict, without: &str, notes: &mut Vec<Problem>) -> Result<[Op
         let m = halves(&k)[i];
         let intrinsics = Intrinsics { fx: m[0], fy: m[4], cx: m[2], cy: m[5] };
         if !intrinsics.is_plausible() {
-            let what =
-                format!("key \"K\", {} finger: {intrinsics:?} is no camera: {without}", Rig::lab().pad_key(finger));
+            let what = format!(
+                "key \"K\", {} finger: {intrinsics:?} is not a camera matrix: {without}",
+                Rig::lab().pad_key(finger)
+            );
             notes.push(problem(dict.file(), what, "expected 3 x 3 pinhole matrices in pixels of the 224 x 171 image"));
             continue;
         }
@@ -250,7 +252,7 @@ fn rigid(values: &[f64]) -> Option<(DAffine3, f64)> {
 }
 
 fn no_frame(dict: &PtDict, key: &str, values: &[f64], without: &str) -> Problem {
-    let what = format!("key \"{key}\" {values:?} is no rigid transform: {without}");
+    let what = format!("key \"{key}\" {values:?} is not a rigid transform: {without}");
     problem(dict.file(), what, "expected x y z qx qy qz qw, all finite")
 }
 

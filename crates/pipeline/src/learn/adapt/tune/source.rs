@@ -42,7 +42,7 @@ pub(super) struct Source {
 impl Source {
     pub(super) fn open(generating: Generating<'_>) -> Result<Self, TaskError> {
         let bundle: Bundle = generating.bundle.open(WHAT)?;
-        let spec = bundle.generator().ok_or_else(|| TaskError::new(WHAT, "the bundle is no generator"))?;
+        let spec = bundle.generator().ok_or_else(|| TaskError::new(WHAT, "the bundle is not a generator"))?;
         let read = |file: &BundleFile| {
             file.read(files::MODEL).map(std::borrow::Cow::into_owned).map_err(|err| TaskError::new(WHAT, err))
         };
