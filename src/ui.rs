@@ -54,7 +54,11 @@ pub fn run(open: Option<PathBuf>, reset: bool) -> Result<(), String> {
     if let WgpuSetup::CreateNew(setup) = &mut native.wgpu_options.wgpu_setup {
         setup.device_descriptor = Arc::new(Gpu::device_descriptor);
     }
-    let mut options = Options::new(Arc::new(Services::of_user()), open);
+    let services = Services::of_user();
+    // What is wrong with the file is said when the studio reads it.
+    let last = (!reset).then(|| services.load_settings().0.last.window).flatten();
+    native.viewport = window::place::restored(native.viewport, last);
+    let mut options = Options::new(Arc::new(services), open);
     options.reset = reset;
     let loss = options.loss.clone();
     let start: eframe::AppCreator<'_> = Box::new(move |cc| Ok(Box::new(StudioApp::new(cc, options))));

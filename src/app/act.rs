@@ -8,7 +8,7 @@ use super::command::{
     LearnCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand, TasksCommand, UiRequest, ViewCommand,
     WorkbenchCommand,
 };
-use super::keys::{ImprintSource, ShiftMode};
+use super::keys::ImprintSource;
 use super::learn::{self, Network};
 use super::pane::Workspace;
 use super::settings::prefer;
@@ -61,12 +61,6 @@ impl Absent {
 fn distances(state: &State) -> Option<Command> {
     let on = state.workbench.layer == Layer::Distance;
     does(WorkbenchCommand::SetLayer(if on { Layer::None } else { Layer::Distance }))
-}
-
-/// The next choice of sides that have a 3D view.
-fn next_sides(state: &State) -> Option<Command> {
-    let next = next_of(&state.settings.scene_sides());
-    does(prefer(move |s| _ = s.sides.insert(s.workspace, next)))
 }
 
 fn does(command: impl Into<Command>) -> Option<Command> {
@@ -131,16 +125,6 @@ fn undo(state: &State) -> Option<Command> {
 fn is_corrected(state: &State) -> bool {
     let finger = state.selection.finger;
     results::drawn_mask(state, results::worked_on(state, finger), finger).is_some()
-}
-
-/// The shifts, one after the other; the refit, where there is one, comes after the last of the others.
-fn next_shift(state: &State) -> Option<Command> {
-    let next = match (state.settings.shift, state.settings.refit) {
-        (ShiftMode::Refit(_), _) => ShiftMode::Raw,
-        (ShiftMode::ExactInverse, Some(refit)) => ShiftMode::Refit(refit),
-        (shift, _) => next_of(&shift),
-    };
-    when(next != state.settings.shift, prefer(move |s| s.shift = next))
 }
 
 /// Gives up what is under way: what is in hand first, jobs last.

@@ -102,8 +102,6 @@ macro_rules! actions {
             state => when(state.table.result.is_some(), ViewCommand::Ui(UiRequest::Pick(Purpose::Table)));
         CancelJobs, Generate, "Cancel", "Closes a dialog, drops a stroke, rejects a suggestion; else stops what is running", [plain("Esc")],
             state => cancel(state);
-        NextShift, Generate, "Next depth scale", "Cycles through the depth scales: uncorrected, as in the paper, calibrated, matched to this data set", [shift("P")],
-            state => next_shift(state);
         Refit, Generate, "Match depths to this data set", "Matches the mean and deviation of predicted depths to the measurements of this data set (refit)", [],
             state => when(results::can_generate(state).is_ok(), PredictCommand::Refit);
 
@@ -147,8 +145,6 @@ macro_rules! actions {
             state => editable(state, LabelsCommand::AdoptAutomatic);
         Propose, Mask, "Propose a mask", "Shows a suggested mask over the current one, to accept as a whole or by brush; nothing changes until then", [plain("G")],
             state => of_pair(state, ViewCommand::Propose(!state.selection.proposing));
-        NextProposal, Mask, "Next proposal source", "Cycles through the sources of suggestions: automatic, CAD distance, strokes", [shift("G")],
-            _ => does(prefer(|s| s.mask.proposal = next_of(&s.mask.proposal)));
         LetThrough, Mask, "Let the proposal through", "Tools accept the suggestion where they paint; off: they paint contact", [shift("L")],
             state => does(paint(Paint::LetThrough)).filter(|_| state.settings.mask.paint == Paint::LetThrough || results::proposes(state));
         ResetMask, Mask, "Back to the automatic mask", "Removes what you drew", [shift("T")],
@@ -177,8 +173,6 @@ macro_rules! actions {
             state => editable(state, LabelsCommand::SetReview(Review::Flagged));
         Skip, Mask, "Skip", "Leaves the pair out", [ctrl("Backspace")],
             state => editable(state, LabelsCommand::SetReview(Review::Skip));
-        MarkTodo, Mask, "Back to todo", "Clears the review state", [],
-            state => editable(state, LabelsCommand::SetReview(Review::Todo));
 
         RunPose, Pose, "Try again", "Computes again what failed", [ctrl("R")],
             state => of_pair(state, TasksCommand::Retry);
@@ -220,8 +214,6 @@ macro_rules! actions {
             state => inspect(state, |s| s.inspection.num_steps(s.run) > 1, InspectCommand::Play(!state.inspect.playing));
         OwnStarts, Pose, "All starts", "Back from a single start to all that the registration tries", [],
             state => when(state.inspect.start.is_some(), InspectCommand::Start(None));
-        NextPoseEngine, Pose, "Next registration", "Cycles through the registration methods", [],
-            _ => does(prefer(|s| s.registration = next_of(&s.registration.with_own_gate())));
 
         LockRange, View, "Lock the color range", "Same colors in every pair; off: fitted to each", [plain("O")],
             _ => does(prefer(|s| s.range.locked ^= true));
@@ -249,10 +241,6 @@ macro_rules! actions {
             state => distances(state);
         NextLayer, View, "Next coloring", "Cycles through the colorings of the contact points: plain, residual, pixels used, distance, pull lines", [shift("V")],
             state => does(WorkbenchCommand::SetLayer(next_of(&state.workbench.layer)));
-        NextSides, View, "Next 3D side", "Cycles through both 3D views, measured only, predicted only", [],
-            state => next_sides(state);
-        NextGel, View, "Next GelSlim image", "Cycles through the difference, the image in contact and the one without", [],
-            _ => does(prefer(|s| s.gel = next_of(&s.gel)));
         BothClouds, View, "Both clouds", "Shows measured and predicted points in each 3D view", [],
             state => does(WorkbenchCommand::SetBothClouds(!state.workbench.both_clouds));
         CompareMode, View, "Next comparison", "Switches between side by side and difference in Compare", [shift("F")],
@@ -292,7 +280,7 @@ macro_rules! actions {
 
         Palette, Help, "Command palette", "Finds any action, pane, pair or tool", [ctrl("P"), ctrl("K")],
             state => does(ViewCommand::SetPalette(!state.selection.palette));
-        ShortcutSheet, Help, "Shortcuts", "Shows the keys of all actions, and changes them", [plain("?"), plain("F1")],
+        ShortcutSheet, Help, "Shortcuts", "Shows the keys of all actions", [plain("?"), plain("F1")],
             state => does(ViewCommand::SetShortcutSheet(!state.selection.shortcut_sheet));
         ResetSettings, Help, "Reset preferences", "Sets all preferences to their defaults", [],
             _ => does(SettingsCommand::ResetSettings);
@@ -397,19 +385,17 @@ impl Action {
             Self::PredictAll => "score metrics benchmark results table evaluate",
             Self::ExportTable => "csv json save results",
             Self::CancelJobs => "stop abort interrupt",
-            Self::NextShift => "depth offset gain millimeters scale",
             Self::Refit => "statistics mean deviation shift",
             Self::AdoptAutomatic => "use copy automatic mask",
             Self::PaintIn3d | Self::PaintLayers => "cloud points brush lasso front occlusion",
             Self::PaintIgnore => "unknown unsure void class",
-            Self::Propose | Self::NextProposal => "prelabel pre-label suggest auto cad",
+            Self::Propose => "prelabel pre-label suggest auto cad",
             Self::Accept => "confirm take yes",
             Self::ResetMask => "delete mask automatic again",
             Self::Undo => "revert back",
             Self::BrushSmaller | Self::BrushLarger => "pen size radius width",
             Self::RunPose => "retry recompute register registration icp failed",
             Self::TryTools => "which tool wrong cad model identify rank recognize",
-            Self::NextPoseEngine => "icp register method algorithm",
             Self::PoseTool => "hand gizmo drag manual move",
             Self::LockRange | Self::RangeOnce | Self::ResetRange => "colorbar colormap scale limits minimum maximum mm",
             Self::Fit => "zoom center home view",

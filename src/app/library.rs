@@ -301,6 +301,9 @@ fn show(state: &mut State, seq: DatasetSeq, place: Place, source: &Arc<Source>, 
         state.library.tool = None;
         state.library.rows = 0..0;
     }
+    if resumed {
+        state.library.sort = last.sort;
+    }
     state.reorder();
     if resumed {
         let pads = source.dataset.rig.pads().len();

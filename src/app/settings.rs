@@ -6,7 +6,7 @@ pub use super::state::settings::scene::{SceneLayer, SceneLook};
 pub(crate) use super::state::settings::{BRUSH_RADIUS_PX, CLEAN_MM, MAX_CACHE_MIB, STEPS};
 pub use super::state::settings::{
     ColorMap, ColorRange, GelView, GenerateSettings, Last, MaskChoice, MaskSettings, MaskSource, MaskTool,
-    ProposalSource, Settings, SpacePane, Theme, ToolRow,
+    ProposalSource, Settings, SpacePane, Theme, ToolRow, WindowPlace,
 };
 
 use std::fmt;

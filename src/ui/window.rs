@@ -9,6 +9,7 @@ pub(crate) mod layout;
 pub(crate) mod lost;
 pub(crate) mod palette;
 pub(crate) mod pane;
+pub(crate) mod place;
 pub(crate) mod screenshot;
 pub(crate) mod shortcuts;
 pub(crate) mod unsaved;

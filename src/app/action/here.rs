@@ -58,7 +58,7 @@ impl Action {
     fn is_of_scene(self) -> bool {
         use Action as A;
         let look = matches!(self, A::CameraLeft | A::CameraRight | A::CameraFront | A::CameraBack | A::CameraTop)
-            || matches!(self, A::CameraBottom | A::CameraOblique | A::Distances | A::NextSides)
+            || matches!(self, A::CameraBottom | A::CameraOblique | A::Distances)
             || matches!(self, A::Parallel | A::NextLayer | A::BothClouds);
         look || self.is_nudge()
             || matches!(self, A::PoseTool | A::IcpFromHere | A::Accept | A::RevertHand)

@@ -11,7 +11,7 @@ use strum::EnumIter;
 use super::super::action::Action;
 use super::super::keys::{Preset, Registration, Sampler, ShiftMode, Spacing};
 use super::super::pane::Workspace;
-use super::library::Place;
+use super::library::{Place, Sort};
 use compare::CompareChoice;
 use scene::SceneLook;
 use touch2touch_core::diffusion::GenerateConfig;
@@ -120,6 +120,21 @@ pub struct Last {
     pub cameras: [String; 2],
     /// The pane that filled the window, in the window's own format; empty = none.
     pub maximized: String,
+    /// The order of the list.
+    pub sort: Sort,
+    /// Where the window was, where the system says it.
+    pub window: Option<WindowPlace>,
+}
+
+/// Place of the window on the desktop, points.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct WindowPlace {
+    /// Its upper left corner, with the frame.
+    pub position: [f32; 2],
+    /// Its size, without the frame.
+    pub size: [f32; 2],
+    /// True where it filled the screen; place and size are those from before then.
+    pub maximized: bool,
 }
 
 impl Settings {

@@ -12,7 +12,7 @@ use strum::IntoEnumIterator as _;
 pub use super::lost::Loss;
 use super::pane::{Docking, Panes};
 use super::screenshot::Shot;
-use super::{bars, doctor, export, layout, lost, palette, pane, shortcuts, unsaved};
+use super::{bars, doctor, export, layout, lost, palette, pane, place, shortcuts, unsaved};
 use crate::app::action::Action;
 use crate::app::command::{
     Command, ExportCommand, LabelsCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand, TasksCommand,
@@ -25,7 +25,7 @@ use crate::app::pane::{Kind, Workspace};
 use crate::app::results;
 use crate::app::runtime::Runtime;
 use crate::app::services::Services;
-use crate::app::settings::{Last, MaskTool, Theme, prefer};
+use crate::app::settings::{Last, MaskTool, Theme, WindowPlace, prefer};
 use crate::app::state::State;
 use crate::app::view::Purpose;
 use crate::app::workbench::WorkbenchCommand;
@@ -95,6 +95,8 @@ pub struct StudioApp {
     applied_theme: Option<Theme>,
     applied_zoom: f32,
     folder: Option<PathBuf>,
+    /// Where it is on the desktop.
+    place: Option<WindowPlace>,
     /// True where the window may close: everything is saved, or is not to be.
     leaving: bool,
     /// True once everything that has to be done at the end was done.
@@ -162,6 +164,7 @@ impl StudioApp {
             applied_theme: None,
             applied_zoom: 1.0,
             folder: options.screenshots,
+            place: None,
             leaving: false,
             ended: false,
             shot_sender,
@@ -257,6 +260,8 @@ impl StudioApp {
             both_fingers: state.selection.both_fingers,
             cameras: self.panes.memories.scene.cameras(),
             maximized: self.panes.maximized.and_then(|pane| serde_json::to_string(&pane).ok()).unwrap_or_default(),
+            sort: state.library.sort,
+            window: self.place,
         };
         self.inbox.push(Command::Settings(SettingsCommand::Remember(last)));
     }
@@ -427,6 +432,7 @@ impl eframe::App for StudioApp {
             ctx.send_viewport_cmd(ViewportCommand::Close);
             return;
         }
+        self.place = place::of(ctx, self.place);
         let doc = &self.state.document;
         let open = !doc.unsaved.is_empty() || doc.stroke.is_some();
         if open && !self.leaving && ctx.input(|i| i.viewport().close_requested()) {
@@ -442,11 +448,10 @@ impl eframe::App for StudioApp {
         let before = self.state.settings.workspace;
         let requests = self.runtime.tick(&mut self.state, commands);
         if travels && !self.state.document.has_open_polygon() {
-            // The pen is not to be followed into another state.
+            // The pen is not to be followed into another state or workspace.
             self.lift_pen();
         }
         if self.state.settings.workspace != before {
-            // The pen is not to be followed into another workspace.
             self.lift_pen();
             self.panes.memories.browser.scrolled_to = None;
         }
