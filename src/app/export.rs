@@ -29,7 +29,7 @@ use touch2touch_pipeline::job::JobCx;
 use touch2touch_pipeline::labels::Labels;
 use touch2touch_pipeline::steps::estimate::Estimate;
 use touch2touch_pipeline::steps::prediction::predicted_by;
-use touch2touch_pipeline::steps::tool::NamedTool;
+use touch2touch_pipeline::steps::tool::LoadedTool;
 use touch2touch_pipeline::still::{StillSetup, still};
 
 /// A command to what is taken away.
@@ -145,7 +145,7 @@ pub struct PairExport {
     /// True where it has a pose.
     posed: bool,
     truth: Option<PlanarPose>,
-    tool: Option<Arc<NamedTool>>,
+    tool: Option<Arc<LoadedTool>>,
 }
 
 impl PairExport {

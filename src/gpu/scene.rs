@@ -170,28 +170,56 @@ impl SceneRenderer {
     ) -> Result<bool, GpuError> {
         let before = self.shown.take();
         let result = gpu.guarded("drawing a 3D view", || {
-            let changed = self.update(gpu, scene, camera, part)?;
-            if scene.eye_dome && self.depth.as_ref().is_none_or(|(of, _)| *of != target.generation()) {
-                let depth = [wgpu::BindingResource::TextureView(target.depth_alone())];
-                let depth = gpu.bind("Edl::depth", &self.pipelines.depth_layout, &depth);
-                self.depth = Some((target.generation(), depth));
+            let (changed, shown) = self.update(gpu, scene, (camera, part), target)?;
+            if !changed && before.as_ref() == Some(&shown) {
+                return Ok((shown, false));
             }
-            let shown = Shown {
-                target: target.generation(),
-                background: match (scene.transparent, scene.background) {
-                    (true, _) => [0.0; 4],
-                    (false, [r, g, b]) => [r, g, b, 1.0],
-                },
-                eye_dome: scene.eye_dome,
-                moving: scene.moving && scene.eye_dome,
-                casters: casters(scene),
-                order: order(scene, gpu.software && scene.moving),
-            };
-            let draw = changed || before.as_ref() != Some(&shown);
-            if draw {
-                self.draw(gpu, &shown, target);
+            // In passes, with the shading by depth between them: hollows in the meshes, which points would fill with copies
+            // of themselves, then what lies behind its neighbors.
+            let label = Some("Scene::encoder");
+            let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label });
+            if let Some(floor) = &mut self.floor {
+                let meshes = &self.meshes;
+                let draw = |pass: &mut wgpu::RenderPass<'_>, name: &str| {
+                    if let Some(data) = meshes.get(name) {
+                        data.draw(pass);
+                    }
+                };
+                floor.throw(&mut encoder, &self.pipelines, &shown.casters, draw);
             }
-            Ok((shown, draw))
+            let whole = Pass { clear: Some(shown.background), with_depth: true, last: true };
+            if let Some((_, depth)) = self.depth.as_ref().filter(|_| shown.eye_dome) {
+                let until = |layer: Layer| shown.order.partition_point(|(of, _)| *of < layer);
+                let (meshes, rest) = shown.order.split_at(until(Layer::Points));
+                let (points, over) = rest.split_at(until(Layer::Outline) - meshes.len());
+                self.draw_layers(&mut target.begin(&mut encoder, Pass { last: false, ..whole }), meshes);
+                let shade = |encoder: &mut wgpu::CommandEncoder, pipeline, last| {
+                    let mut pass = target.begin(encoder, Pass { clear: None, with_depth: false, last });
+                    pass.set_pipeline(pipeline);
+                    pass.set_bind_group(0, &self.view_bindings, &[]);
+                    pass.set_bind_group(1, depth, &[]);
+                    pass.draw(0..6, 0..1);
+                };
+                // What moves is drawn without: nobody sees it.
+                if !shown.moving && meshes.iter().any(|(layer, _)| *layer == Layer::OpaqueMesh) {
+                    shade(&mut encoder, &self.pipelines.hollows, false);
+                }
+                if !points.is_empty() {
+                    self.draw_layers(
+                        &mut target.begin(&mut encoder, Pass { clear: None, last: false, ..whole }),
+                        points,
+                    );
+                }
+                shade(&mut encoder, &self.pipelines.edl, over.is_empty());
+                if !over.is_empty() {
+                    self.draw_layers(&mut target.begin(&mut encoder, Pass { clear: None, ..whole }), over);
+                }
+            } else {
+                self.draw_layers(&mut target.begin(&mut encoder, whole), &shown.order);
+            }
+            gpu.queue.submit([encoder.finish()]);
+            self.counters.renders += 1;
+            Ok((shown, true))
         });
         match result {
             Ok((shown, drawn)) => {
@@ -209,8 +237,14 @@ impl SceneRenderer {
         }
     }
 
-    /// Sends what changed; returns whether anything did.
-    fn update(&mut self, gpu: &Gpu, scene: &SceneData, camera: &Camera, part: Part) -> Result<bool, GpuError> {
+    /// Sends what changed; returns whether anything did, and what the picture is drawn from.
+    fn update(
+        &mut self,
+        gpu: &Gpu,
+        scene: &SceneData,
+        (camera, part): (&Camera, Part),
+        target: &Target,
+    ) -> Result<(bool, Shown), GpuError> {
         let mut done = Counters {
             uniforms: u64::from(self.view.set(gpu, camera.uniform(part, scene.unit_px))),
             ..Counters::default()
@@ -252,52 +286,23 @@ impl SceneRenderer {
         }
         self.counters.uploads += done.uploads;
         self.counters.uniforms += done.uniforms;
-        Ok(done != Counters::default())
-    }
-
-    /// Draws the picture in passes, with the shading by depth between them: hollows in the meshes, which points would fill
-    /// with copies of themselves, then what lies behind its neighbors.
-    fn draw(&mut self, gpu: &Gpu, shown: &Shown, target: &Target) {
-        let label = Some("Scene::encoder");
-        let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label });
-        if let Some(floor) = &mut self.floor {
-            let meshes = &self.meshes;
-            let draw = |pass: &mut wgpu::RenderPass<'_>, name: &str| {
-                if let Some(data) = meshes.get(name) {
-                    data.draw(pass);
-                }
-            };
-            floor.throw(&mut encoder, &self.pipelines, &shown.casters, draw);
+        if scene.eye_dome && self.depth.as_ref().is_none_or(|(of, _)| *of != target.generation()) {
+            let depth = [wgpu::BindingResource::TextureView(target.depth_alone())];
+            let depth = gpu.bind("Edl::depth", &self.pipelines.depth_layout, &depth);
+            self.depth = Some((target.generation(), depth));
         }
-        let whole = Pass { clear: Some(shown.background), with_depth: true, last: true };
-        if let Some((_, depth)) = self.depth.as_ref().filter(|_| shown.eye_dome) {
-            let until = |layer: Layer| shown.order.partition_point(|(of, _)| *of < layer);
-            let (meshes, rest) = shown.order.split_at(until(Layer::Points));
-            let (points, over) = rest.split_at(until(Layer::Outline) - meshes.len());
-            self.draw_layers(&mut target.begin(&mut encoder, Pass { last: false, ..whole }), meshes);
-            let shade = |encoder: &mut wgpu::CommandEncoder, pipeline, last| {
-                let mut pass = target.begin(encoder, Pass { clear: None, with_depth: false, last });
-                pass.set_pipeline(pipeline);
-                pass.set_bind_group(0, &self.view_bindings, &[]);
-                pass.set_bind_group(1, depth, &[]);
-                pass.draw(0..6, 0..1);
-            };
-            // What moves is drawn without: nobody sees it.
-            if !shown.moving && meshes.iter().any(|(layer, _)| *layer == Layer::OpaqueMesh) {
-                shade(&mut encoder, &self.pipelines.hollows, false);
-            }
-            if !points.is_empty() {
-                self.draw_layers(&mut target.begin(&mut encoder, Pass { clear: None, last: false, ..whole }), points);
-            }
-            shade(&mut encoder, &self.pipelines.edl, over.is_empty());
-            if !over.is_empty() {
-                self.draw_layers(&mut target.begin(&mut encoder, Pass { clear: None, ..whole }), over);
-            }
-        } else {
-            self.draw_layers(&mut target.begin(&mut encoder, whole), &shown.order);
-        }
-        gpu.queue.submit([encoder.finish()]);
-        self.counters.renders += 1;
+        let shown = Shown {
+            target: target.generation(),
+            background: match (scene.transparent, scene.background) {
+                (true, _) => [0.0; 4],
+                (false, [r, g, b]) => [r, g, b, 1.0],
+            },
+            eye_dome: scene.eye_dome,
+            moving: scene.moving && scene.eye_dome,
+            casters: casters(scene),
+            order: order(scene, gpu.software && scene.moving),
+        };
+        Ok((done != Counters::default(), shown))
     }
 
     fn draw_layers(&self, pass: &mut wgpu::RenderPass<'_>, order: &[(Layer, String)]) {

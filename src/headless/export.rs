@@ -14,7 +14,7 @@ use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::export::pair_files::{PairParts, write};
 use touch2touch_pipeline::job::JobCx;
 use touch2touch_pipeline::labels::{ImprintSource, Labels};
-use touch2touch_pipeline::steps::estimate::{Touch, estimate};
+use touch2touch_pipeline::steps::estimate::{Estimate, Touch};
 use touch2touch_pipeline::steps::prediction::predicted_by;
 use touch2touch_pipeline::steps::recipe::Stage;
 use touch2touch_pipeline::steps::tool::load_tool;
@@ -56,9 +56,9 @@ pub(super) fn run(args: &ExportArgs) -> VerbResult {
     let recipe = args.recipe.of(args.imprint, &dataset.rig)?;
     let labels = labels_of(&Labels::of(&dataset), &entry.name, &output);
     let touch = Touch { dataset: &dataset, pair: id, sample: &sample, tool: tool.as_ref(), labels: &labels };
-    let estimate = estimate(touch, &recipe, Stage::Pose, &models, &JobCx::unwatched())?;
+    let estimate = Estimate::new(&recipe).with_surface().reach(touch, Stage::Pose, &models, &JobCx::unwatched())?;
     let contact = estimate.contact();
-    let (clouds, truth) = (contact.clouds(&sample)?, sample.grasp_from_object);
+    let truth = sample.grasp_from_object;
     let pose = estimate.pose().map_err(|err| output.note(&err.to_string())).ok();
     let mask = contact.made_of();
     let prediction = recipe.generator.as_ref().map(|(bundle, config)| predicted_by(&bundle.name, config, recipe.shift));
@@ -67,7 +67,7 @@ pub(super) fn run(args: &ExportArgs) -> VerbResult {
         source: args.imprint,
         prediction: prediction.as_deref(),
         rig: &sample.rig,
-        clouds: &clouds,
+        clouds: estimate.surface(),
         mask: &mask,
         registration: recipe.registration,
         pose,

@@ -36,7 +36,7 @@ fn a_file_written_by_pytorch_reads_back_to_the_last_bit() {
     assert_eq!(dict.scalar("a_float").unwrap(), 0.25);
     assert_eq!(dict.scalar("an_int").unwrap(), 7.0);
     assert_eq!(dict.scalar("theta").unwrap(), -0.107_569_456_100_463_87);
-    assert_eq!(dict.f32s("transposed", &[&[5, 3]]).unwrap().len(), 15);
+    assert_eq!(dict.shaped("transposed", &[&[5, 3]]).unwrap().into_f32().len(), 15);
 }
 
 #[test]
@@ -48,7 +48,7 @@ fn what_is_not_there_or_of_another_shape_is_named() {
         text.contains("bubble_imprint") && text.contains("transposed") && text.contains("torch_views.pt"),
         "{text}"
     );
-    let err = dict.f32s("f32", &[&[2, 1, 140, 175], &[140, 175]]).unwrap_err();
+    let err = dict.shaped("f32", &[&[2, 1, 140, 175], &[140, 175]]).unwrap_err();
     let text = err.to_string();
     assert!(text.contains("[2, 3, 4]") && text.contains("[2, 1, 140, 175] or [140, 175]"), "{text}");
     assert_eq!(dict.scalar("f32").unwrap_err().kind, FileErrorKind::Content);
@@ -154,7 +154,7 @@ fn a_file_of_torch_opens_whatever_its_name() {
             let dict = read_dict(&path).unwrap_or_else(|err| panic!("{name}: {err}"));
             let theta = dict.scalar("theta").unwrap_or_else(|err| panic!("{name}: {err}"));
             assert_eq!(theta, -0.107_569_456_100_463_87, "{name}");
-            assert_eq!(dict.f32s("bubble_imprint", &[&[2, 1, 3, 4]]).unwrap().len(), 24, "{name}");
+            assert_eq!(dict.shaped("bubble_imprint", &[&[2, 1, 3, 4]]).unwrap().into_f32().len(), 24, "{name}");
             assert_eq!(dict.scalar("scale").unwrap(), 0.1, "{name}");
         }
     }

@@ -11,7 +11,6 @@ use crate::job::JobCx;
 use crate::steps::imprint::imprint_of;
 use crate::steps::models::Models;
 use crate::steps::predict::Generating;
-use crate::steps::tool::tool_file;
 use touch2touch_core::dataset::{PairId, Problem};
 use touch2touch_core::doubt::{Doubt, PairInput, Placed, judge};
 use touch2touch_core::mesh::TriMesh;
@@ -58,7 +57,7 @@ pub fn examine_reading(dataset: &Dataset, pairs: usize, generator: Option<Genera
     let felt: Vec<PairInput<'_>> =
         felt.map(|((_, tool, sample), beside)| PairInput { tool: *tool, sample, beside: Some(beside) }).collect();
     let tools = dataset.index.tools();
-    let mesh = |tool: &String| Some((tool.clone(), tool_file(dataset, tool).ok()?.mesh));
+    let mesh = |tool: &String| Some((tool.clone(), dataset.tool_mesh(tool).ok()??));
     let meshes: BTreeMap<String, TriMesh> = tools.par_iter().take(MOST_TOOLS).filter_map(mesh).collect();
     let mut doubts = match generator {
         Some(generator) => judge(&felt, &meshes, Some(&mut |samples| placed(samples, generator, cx))),

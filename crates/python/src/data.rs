@@ -503,8 +503,7 @@ pub(crate) fn simulate(
     })?;
     let grasp = Grasp { theta_rad: angle, x_m: x, y_m: y };
     let sample = away(py, |_| Ok(sim::simulate(spec, grasp, seed, &chosen.config())))?;
-    let model =
-        touch2touch_pipeline::steps::tool::named_tool(&spec.name, spec.mesh()).map_err(|err| failed(&err))?.model;
+    let model = touch2touch_pipeline::steps::tool::tool_of(&spec.name, spec.mesh()).map_err(|err| failed(&err))?;
     let made = Arc::new(Tool::of(&spec.name, Arc::new(model)));
     Ok(Pair {
         of: Of::Simulated(made, Simulation { grasp, seed, sensors, gelslims }),

@@ -10,7 +10,7 @@ use pyo3::types::PyTuple;
 use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::pose::ToolModel;
 use touch2touch_pipeline::io::dataset::{ToolScale, read_in_meters};
-use touch2touch_pipeline::steps::tool::named_tool;
+use touch2touch_pipeline::steps::tool::tool_of;
 
 use crate::arrays::{Array, array, points, points_of};
 use crate::process::{failed, refused};
@@ -59,8 +59,8 @@ impl Tool {
             }
         };
         let name = name.unwrap_or(called);
-        let made = py.detach(|| named_tool(&name, mesh)).map_err(|err| failed(&err))?;
-        Ok(Self { model: Arc::new(made.model), name: made.name })
+        let model = py.detach(|| tool_of(&name, mesh)).map_err(|err| failed(&err))?;
+        Ok(Self { model: Arc::new(model), name })
     }
 
     /// Corners of the model (V, 3), meters, object frame.

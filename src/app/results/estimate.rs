@@ -19,7 +19,7 @@ use touch2touch_pipeline::steps::estimate::{Estimate, Touch};
 use touch2touch_pipeline::steps::mask::MaskChoice;
 use touch2touch_pipeline::steps::pose::PoseResult;
 use touch2touch_pipeline::steps::recipe::{Recipe, Stage};
-use touch2touch_pipeline::steps::tool::NamedTool;
+use touch2touch_pipeline::steps::tool::LoadedTool;
 
 impl Computes for EstimateKey {
     fn job(&self, state: &State, services: &Arc<Services>) -> Option<Job<Estimate>> {
@@ -32,7 +32,34 @@ impl Computes for EstimateKey {
             // The masks that there are were drawn.
             recipe.mask = MaskChoice::default();
         }
-        let (begun, labels) = (begun(state, self, &recipe)?, drawn(state, self, &recipe)?);
+        let known = &state.results.estimates;
+        // The part of it that is there already.
+        let begun = match (&self.pose, known.get(&self.its_cloud())) {
+            (Some((_, registration)), Some(cloud)) => {
+                cloud.again(&Recipe { registration: *registration, ..cloud.recipe().clone() })
+            }
+            _ if self.stage == Stage::Imprint => {
+                let (ImprintKey::Predicted(made, _), _) = self.parts.iter().flatten().next()? else { return None };
+                let mut predictions = PerPad::default();
+                predictions[made.touch.finger] = Some((**state.results.predictions.get(made)?).clone());
+                Estimate::of_predictions(&recipe, predictions)
+            }
+            _ => {
+                let (mut imprints, mut unmasked) = (PerPad::default(), Vec::new());
+                for (pad, (imprint, mask)) in self.parts.entries() {
+                    imprints[pad] = Some(results::imprint_of(state, imprint).ready()?.clone());
+                    unmasked.extend(mask.is_none().then_some(pad));
+                }
+                let mut begun = Estimate::with_imprints(&recipe, imprints).without_masks(unmasked);
+                for (pad, (imprint, _)) in self.parts.entries() {
+                    if let Some(other) = known.get(&EstimateKey::imprint(imprint)) {
+                        begun.take_over(pad, other);
+                    }
+                }
+                begun
+            }
+        };
+        let labels = drawn(state, self, &recipe)?;
         let tool = state.library.entry(pair.pair).and_then(|entry| entry.tool.as_deref());
         let tool = tool.map(|tool| ToolKey { dataset: pair.dataset, name: tool.into() });
         let tool = tool.and_then(|key| state.results.tools.get(&key).cloned());
@@ -55,8 +82,7 @@ impl Computes for EstimateKey {
             let none = gone();
             let tool = tool.as_deref().map(|tool| &tool.model).ok_or(&none);
             let touch = Touch { dataset: &source.dataset, pair: pair.pair, sample: &sample, tool, labels: &labels };
-            let made = begun.reach(touch, stage, &services.models, cx)?;
-            if stage >= Stage::Cloud { made.with_surface(&sample) } else { Ok(made) }
+            begun.with_surface().reach(touch, stage, &services.models, cx)
         }))
     }
 
@@ -91,32 +117,6 @@ fn note(state: &mut State, imprint: &ImprintKey, mask: Option<&MaskVersion>, mad
         let text = format!("{}, {} finger: {why}", entry.name, state.finger_name(touch.finger));
         state.log.push(Level::Warning, text, None, None);
     }
-}
-
-/// The part of an estimate that is there already; `None` if an input is missing.
-fn begun(state: &State, key: &EstimateKey, recipe: &Recipe) -> Option<Estimate> {
-    let known = &state.results.estimates;
-    if let (Some((_, registration)), Some(cloud)) = (key.pose.as_ref(), known.get(&key.its_cloud())) {
-        return Some(cloud.again(&Recipe { registration: *registration, ..cloud.recipe().clone() }));
-    }
-    if key.stage == Stage::Imprint {
-        let (ImprintKey::Predicted(made, _), _) = key.parts.iter().flatten().next()? else { return None };
-        let mut predictions = PerPad::default();
-        predictions[made.touch.finger] = Some((**state.results.predictions.get(made)?).clone());
-        return Some(Estimate::of_predictions(recipe, predictions));
-    }
-    let (mut imprints, mut unmasked) = (PerPad::default(), Vec::new());
-    for (pad, (imprint, mask)) in key.parts.entries() {
-        imprints[pad] = Some(results::imprint_of(state, imprint).ready()?.clone());
-        unmasked.extend(mask.is_none().then_some(pad));
-    }
-    let mut begun = Estimate::with_imprints(recipe, imprints).without_masks(unmasked);
-    for (pad, (imprint, _)) in key.parts.entries() {
-        if let Some(other) = known.get(&EstimateKey::imprint(imprint)) {
-            begun.take_over(pad, other);
-        }
-    }
-    Some(begun)
 }
 
 /// The drawn masks that an estimate is made with; `None` if one is not the newest any more.
@@ -232,7 +232,7 @@ pub fn pose_of<'a>(state: &'a State, key: &EstimateKey) -> Option<&'a PoseResult
 }
 
 /// The inputs of a job about a pose: cloud, tool and pair.
-pub(crate) fn registered(state: &State, key: &EstimateKey) -> Option<(Arc<Estimate>, Arc<NamedTool>, Arc<Sample>)> {
+pub(crate) fn registered(state: &State, key: &EstimateKey) -> Option<(Arc<Estimate>, Arc<LoadedTool>, Arc<Sample>)> {
     let (PairKey { dataset, .. }, (name, _)) = (key.place()?.0, key.pose.as_ref()?);
     let estimates = &state.results.estimates;
     Some((

@@ -20,7 +20,7 @@ use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::labels::ImprintOf;
 use touch2touch_pipeline::masks::propose::hand_pose;
 use touch2touch_pipeline::steps::layers::{self, LayerResult};
-use touch2touch_pipeline::steps::tool::{NamedTool, named_tool, tool_file};
+use touch2touch_pipeline::steps::tool::{LoadedTool, load_tool};
 
 impl Computes for RunKey {
     fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Inspection>> {
@@ -147,7 +147,7 @@ impl Computes for RankingKey {
             let key = ToolKey { dataset: open.seq, name: name.as_str().into() };
             (name, state.results.tools.get(&key).cloned())
         };
-        let tools: Vec<(String, Option<Arc<NamedTool>>)> = open.index().tools().into_iter().map(known).collect();
+        let tools: Vec<(String, Option<Arc<LoadedTool>>)> = open.index().tools().into_iter().map(known).collect();
         Some(Job::new(Worker::Compute, "Which tool", move |cx| {
             let mut models = Vec::with_capacity(tools.len());
             for (name, known) in tools {
@@ -155,7 +155,7 @@ impl Computes for RankingKey {
                     return Err(TaskError::cancelled("Which tool"));
                 }
                 // A model that cannot be used is no candidate.
-                let read = || Some(Arc::new(named_tool(&name, tool_file(&source.dataset, &name).ok()?.mesh).ok()?));
+                let read = || Some(Arc::new(load_tool(&source.dataset, &name).ok()?));
                 models.extend(known.or_else(read));
             }
             let tools = models.iter().map(|tool| (tool.name.as_str(), &tool.model));

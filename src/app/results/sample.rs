@@ -18,7 +18,7 @@ use touch2touch_core::rig::PadId;
 use touch2touch_core::sample::{ColorTouch, DepthTouch, PadTouch, Sample};
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::steps::imprint;
-use touch2touch_pipeline::steps::tool::{NamedTool, named_tool, tool_file};
+use touch2touch_pipeline::steps::tool::{LoadedTool, load_tool};
 
 impl Computes for PairKey {
     fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Sample>> {
@@ -150,10 +150,10 @@ impl Computes for LabelsKey {
 }
 
 impl Computes for ToolKey {
-    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<NamedTool>> {
+    fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<LoadedTool>> {
         let (source, name) = (state.library.open.as_ref()?.source.clone(), self.name.clone());
         let what = format!("CAD model of {name}");
-        Some(Job::new(Worker::Compute, what, move |_| named_tool(&name, tool_file(&source.dataset, &name)?.mesh)))
+        Some(Job::new(Worker::Compute, what, move |_| load_tool(&source.dataset, &name)))
     }
 
     fn failed(&self, _: &mut State, _: &TaskError) -> bool {
@@ -179,7 +179,7 @@ pub(crate) fn tool_key(state: &State) -> Result<ToolKey, Absent> {
 }
 
 /// The tool of the selected pair, with its CAD model.
-pub fn tool(state: &State) -> Lookup<'_, NamedTool> {
+pub fn tool(state: &State) -> Lookup<'_, LoadedTool> {
     state.look_or(tool_key(state).map(Some), || None).value()
 }
 

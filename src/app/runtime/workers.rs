@@ -92,7 +92,11 @@ impl Workers {
                 let (state, sender, wake) = (workers[worker as usize].clone(), sender.clone(), wake.clone());
                 let thread = std::thread::Builder::new()
                     .name(worker.name().to_owned())
-                    .spawn(move || work(&state, &sender, &wake))
+                    .spawn(move || {
+                        while run_next(&state, &sender, true) {
+                            wake();
+                        }
+                    })
                     .expect("the system gives a program a handful of threads");
                 threads.push((worker, thread));
             }
@@ -179,17 +183,7 @@ impl Workers {
     }
 
     pub(super) fn run_one(&self, worker: Worker) -> bool {
-        if self.threaded {
-            return false;
-        }
-        let job = lock(&self.workers[worker as usize].queue).pop();
-        match job {
-            Some(job) => {
-                drop(self.sender.send(execute(job)));
-                true
-            }
-            None => false,
-        }
+        !self.threaded && run_next(&self.workers[worker as usize], &self.sender, false)
     }
 
     pub(super) fn waiting(&self, worker: Worker) -> usize {
@@ -218,29 +212,20 @@ impl Workers {
     }
 }
 
-/// The loop of a worker's thread.
-fn work(state: &WorkerState, sender: &Sender<Event>, wake: &Wake) {
-    loop {
-        let job = {
-            let mut queue = lock(&state.queue);
-            loop {
-                if let Some(job) = queue.pop() {
-                    break job;
-                }
-                if queue.closing {
-                    return;
-                }
-                queue = state.filled.wait(queue).unwrap_or_else(std::sync::PoisonError::into_inner);
+/// Runs a worker's next job and sends its end; `false` if there is none. With `wait` there is none only at the end.
+fn run_next(state: &WorkerState, sender: &Sender<Event>, wait: bool) -> bool {
+    let Job { id, what, cx, body, failed } = {
+        let mut queue = lock(&state.queue);
+        loop {
+            if let Some(job) = queue.pop() {
+                break job;
             }
-        };
-        // Nobody listens any more where the runtime is gone.
-        drop(sender.send(execute(job)));
-        wake();
-    }
-}
-
-fn execute(job: Job) -> Event {
-    let Job { id, what, cx, body, failed } = job;
+            if !wait || queue.closing {
+                return false;
+            }
+            queue = state.filled.wait(queue).unwrap_or_else(std::sync::PoisonError::into_inner);
+        }
+    };
     let outcome = if cx.cancel.is_cancelled() {
         Err(TaskError::cancelled(what))
     } else {
@@ -249,7 +234,9 @@ fn execute(job: Job) -> Event {
             Err(message) => Err(TaskError::panicked(what, &message)),
         }
     };
-    Event { id, answer: outcome.unwrap_or_else(failed) }
+    // Nobody listens any more where the runtime is gone.
+    drop(sender.send(Event { id, answer: outcome.unwrap_or_else(failed) }));
+    true
 }
 
 #[cfg(test)]

@@ -26,7 +26,7 @@ use touch2touch_pipeline::masks::propose::Proposal;
 use touch2touch_pipeline::steps::estimate::Estimate;
 use touch2touch_pipeline::steps::layers::LayerResult;
 use touch2touch_pipeline::steps::prediction::Prediction;
-use touch2touch_pipeline::steps::tool::NamedTool;
+use touch2touch_pipeline::steps::tool::LoadedTool;
 
 const MIB: usize = 1 << 20;
 
@@ -41,7 +41,7 @@ macro_rules! table {
         /// The lines about the data set.
         About(AboutKey => Vec<Fact>, |facts| facts.len() * 512) in abouts, MIB;
         /// The CAD model of a tool and what the registration derives from it.
-        Tool(ToolKey => NamedTool, tool_bytes) in tools, 128 * MIB;
+        Tool(ToolKey => LoadedTool, tool_bytes) in tools, 128 * MIB;
         /// The predictions of a touch that lie on the disk from before.
         Stored(StoredKey => Keyed);
         /// Raw predictions: of the pair on screen, of its other finger, of what is compared.
@@ -201,7 +201,7 @@ macro_rules! results {
 
 table!(results);
 
-fn tool_bytes(tool: &NamedTool) -> usize {
+fn tool_bytes(tool: &LoadedTool) -> usize {
     let mesh = tool.model.mesh.vertices.len() * 24 + tool.model.mesh.triangles.len() * 12;
     // The registration's field and tree are of the mesh's order, at least a few MB.
     8 * mesh + (4 << 20)

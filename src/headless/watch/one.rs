@@ -33,7 +33,7 @@ use touch2touch_pipeline::steps::models::Models;
 use touch2touch_pipeline::steps::pose::PoseResult;
 use touch2touch_pipeline::steps::prediction::Prediction;
 use touch2touch_pipeline::steps::recipe::{Recipe, Stage};
-use touch2touch_pipeline::steps::tool::{load_tool, named_tool};
+use touch2touch_pipeline::steps::tool::{load_tool, tool_of};
 
 /// A touch that arrived, with what its result is called and depends on.
 #[derive(Clone, Copy)]
@@ -246,7 +246,7 @@ fn tool_model(dataset: &Dataset, name: &str) -> anyhow::Result<ToolModel> {
     if Path::new(name).extension().is_some_and(|e| e.eq_ignore_ascii_case("stl")) {
         let mesh = read_in_meters(Path::new(name), None);
         let mesh = mesh.map_err(|err| anyhow::anyhow!("{err}: {}", err.hint))?;
-        return Ok(named_tool(name, mesh)?.model);
+        return Ok(tool_of(name, mesh)?);
     }
     let demo = Dataset::demo();
     let has_it = dataset.tool_mesh_file(name).is_some() || demo.tool_mesh(name).ok().flatten().is_none();

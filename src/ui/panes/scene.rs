@@ -211,7 +211,7 @@ fn one_side(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, source: ImprintSo
         _ => {}
     }
     let Ok(device) = cx.device else { return };
-    update(cx, memory, source);
+    build::update(cx, memory, source);
     let label = match source {
         ImprintSource::Measured => "3D view, measured",
         ImprintSource::Predicted => "3D view, predicted",
@@ -244,7 +244,8 @@ fn one_side(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, source: ImprintSo
         // Moving views are drawn coarsely: draw all there is once they rest.
         ui.ctx().request_repaint_after(std::time::Duration::from_millis(120));
     }
-    memory.views[source as usize].draw(ui, device, &output, &scene);
+    let view = &mut memory.views[source as usize];
+    view.draw(ui, device, &output, &scene).unwrap_or_else(|err| view.failed(ui, &output, &err));
     // While a stroke is drawn, what is shown is of the move before.
     if matches!(lookup, Lookup::Stale(_) | Lookup::Waiting) && state.document.stroke.is_none() {
         ui.painter().rect_filled(output.response.rect, 0.0, cx.p.canvas.gamma_multiply(0.45));
@@ -287,19 +288,6 @@ fn place_camera(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource, output:
         other.camera = camera;
         other.placed |= placed;
     }
-}
-
-/// Brings what the view draws up to date.
-fn update(cx: &mut Cx<'_>, memory: &mut Memory, source: ImprintSource) {
-    let state = cx.state;
-    for side in std::iter::once(source).chain(state.workbench.both_clouds.then(|| source.other())) {
-        if let (Lookup::Ready(clouds), Ok(Some(key))) = (results::cloud(state, side), results::cloud_key(state, side)) {
-            build::update_cloud(cx, memory, side, key, clouds);
-        }
-    }
-    build::update_mesh(cx, &mut memory.mesh, &mut memory.revision);
-    layers::update(cx, memory, source);
-    steps::update(cx, memory, source);
 }
 
 /// Centers a view on the point under the pointer; whether there is one.

@@ -152,40 +152,16 @@ impl SceneView {
     }
 
     /// Brings the picture up to date and paints it. Nothing is drawn on the device when nothing changed.
-    pub(crate) fn draw(&mut self, ui: &Ui, device: &Device, output: &SceneOutput, scene: &SceneData) {
-        match self.try_draw(device, output, scene) {
-            Ok((texture, drawn)) => {
-                if drawn && let Some(view) = self.drawn.as_ref().map(|drawn| drawn.target.view()) {
-                    ui.ctx().with_plugin(|cache: &mut FrameCache| cache.show(texture, view));
-                }
-                let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
-                ui.painter().image(texture, output.rect, uv, egui::Color32::WHITE);
-                self.error = None;
-            }
-            Err(error) => {
-                // Logged once per cause: the same view fails in every frame.
-                let text = error.to_string();
-                if self.error.as_ref() != Some(&text) {
-                    log::error!("3D view: {text}");
-                }
-                ui.painter().text(
-                    output.rect.center(),
-                    egui::Align2::CENTER_CENTER,
-                    format!("This view cannot be drawn.\n{text}"),
-                    egui::FontId::proportional(12.0),
-                    ui.visuals().error_fg_color,
-                );
-                self.error = Some(text);
-            }
-        }
-    }
-
-    fn try_draw(
+    ///
+    /// # Errors
+    /// [`GpuError`], for [`Self::failed`].
+    pub(crate) fn draw(
         &mut self,
+        ui: &Ui,
         device: &Device,
         output: &SceneOutput,
         scene: &SceneData,
-    ) -> Result<(TextureId, bool), GpuError> {
+    ) -> Result<(), GpuError> {
         let gpu = &device.gpu;
         // A program that draws gets a quarter of the pixels to do while the camera moves.
         let size = if scene.moving && gpu.software { output.size.map(|s| s.div_ceil(2)) } else { output.size };
@@ -214,7 +190,30 @@ impl SceneView {
             );
         }
         let part = Part::whole(drawn.target.size());
-        let changed = drawn.renderer.render(gpu, scene, (&self.camera, part), &drawn.target)?;
-        Ok((drawn.texture, changed))
+        if drawn.renderer.render(gpu, scene, (&self.camera, part), &drawn.target)? {
+            let (texture, view) = (drawn.texture, drawn.target.view());
+            ui.ctx().with_plugin(|cache: &mut FrameCache| cache.show(texture, view));
+        }
+        let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
+        ui.painter().image(drawn.texture, output.rect, uv, egui::Color32::WHITE);
+        self.error = None;
+        Ok(())
+    }
+
+    /// Says in place of the picture why it cannot be drawn.
+    pub(crate) fn failed(&mut self, ui: &Ui, output: &SceneOutput, error: &GpuError) {
+        // Logged once per cause: the same view fails in every frame.
+        let text = error.to_string();
+        if self.error.as_ref() != Some(&text) {
+            log::error!("3D view: {text}");
+        }
+        ui.painter().text(
+            output.rect.center(),
+            egui::Align2::CENTER_CENTER,
+            format!("This view cannot be drawn.\n{text}"),
+            egui::FontId::proportional(12.0),
+            ui.visuals().error_fg_color,
+        );
+        self.error = Some(text);
     }
 }

@@ -11,7 +11,7 @@ use crate::io::dataset::{Dataset, SourceKind, ToolScale};
 use crate::job::JobCx;
 use crate::labels::Review;
 use crate::pairs::spread;
-use crate::steps::tool::{tool_file, units_of};
+use crate::steps::tool::{offer, units_of};
 use touch2touch_core::dataset::{PairId, Split};
 use touch2touch_core::rig::SensorKind;
 use touch2touch_core::sample::{PadTouch, Sample, Scale};
@@ -124,11 +124,10 @@ enum Cad {
 
 fn models(dataset: &Dataset) -> BTreeMap<String, Cad> {
     let one = |tool: &String| {
-        let cad = match tool_file(dataset, tool) {
-            Ok(_) => Cad::Usable,
-            Err(_) if dataset.tool_mesh_file(tool).is_none() => Cad::Missing,
-            Err(err) => {
-                let offer = err.units.as_ref();
+        let cad = match dataset.tool_mesh(tool) {
+            Ok(Some(_)) => Cad::Usable,
+            Err(err) if dataset.tool_mesh_file(tool).is_some() => {
+                let offer = offer(dataset, tool, &err);
                 let cures = offer.iter().flat_map(|offer| {
                     let cure = |(unit, _): &(_, _)| Cure::ReadTool {
                         tool: offer.tool.clone(),
@@ -140,6 +139,7 @@ fn models(dataset: &Dataset) -> BTreeMap<String, Cad> {
                 // The likeliest unit alone: the others are in the pane that cannot draw the tool.
                 Cad::Refused(cures.take(1).collect())
             }
+            _ => Cad::Missing,
         };
         (tool.clone(), cad)
     };

@@ -159,8 +159,7 @@ mod tests {
         let sample = simulate(spec, random_grasp(3), 3, &SimConfig::default());
         let imprints = measured(&sample);
         let masks = imprints.clone().map(|i| i.map(|i| threshold(&i, 0.005)));
-        let of = sample.rig.pads().map(|pad| Some((imprints[pad].as_ref()?, masks[pad].as_ref()))).collect();
-        let clouds = clouds(&sample, &of).unwrap();
+        let clouds = clouds(&sample, &imprints.as_ref(), &masks.as_ref()).unwrap();
         // The lab's models lie 4 mm beside the grasp plane.
         let mut model = spec.mesh();
         model.vertices.iter_mut().for_each(|v| v.x -= 0.004);

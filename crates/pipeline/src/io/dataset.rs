@@ -33,6 +33,7 @@ use touch2touch_core::rig::{PerPad, Rig};
 use touch2touch_core::sample::{DepthCamera, Sample};
 use touch2touch_core::turn::Turn;
 
+use super::catch_panic::catch_panic;
 use super::dataset_location::DatasetLocation;
 use super::error::{FileError, FileErrorKind};
 
@@ -266,7 +267,7 @@ impl Dataset {
         if self.index.get(id).is_none() {
             return Err(error::no_such_pair(id));
         }
-        self.catch_panic(id, || {
+        let read = || {
             let mut loaded = match (&self.source, self.files.get(id.0 as usize)) {
                 (Source::BuiltIn(set), _) => set.load(id).map(|sample| Loaded { sample, ..Loaded::default() }),
                 (_, Some(Files::Lab(halves))) => Some(halves.load()?),
@@ -283,12 +284,13 @@ impl Dataset {
             plausible::notes(&mut loaded, &file);
             self.lend_cameras(&mut loaded.sample);
             Ok(loaded)
-        })
+        };
+        catch_panic(read).unwrap_or_else(|message| Err(error::bug(&self.pair_files(id), &message)))
     }
 
     /// Reads something of a pair. A panic is that pair's error: no file may end a run over others.
     fn catch_panic<T>(&self, id: PairId, read: impl FnOnce() -> Result<T, FileError>) -> Result<T, FileError> {
-        super::catch_panic::catch_panic(read).unwrap_or_else(|message| Err(error::bug(&self.pair_files(id), &message)))
+        catch_panic(read).unwrap_or_else(|message| Err(error::bug(&self.pair_files(id), &message)))
     }
 
     /// The tool's CAD model in meters and the object frame; `None` where the data set has none.

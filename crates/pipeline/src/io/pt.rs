@@ -228,11 +228,29 @@ impl PtDict {
     /// # Errors
     /// [`FileErrorKind::Missing`] where there is none, or another value (numpy's among them); else its values cannot be read.
     pub fn tensor(&self, key: &str) -> Result<Tensor, FileError> {
+        self.shaped(key, &[])
+    }
+
+    /// [`PtDict::tensor`] of one of `shapes`, or of any where there are none.
+    ///
+    /// # Errors
+    /// As [`PtDict::tensor`], and [`FileErrorKind::Content`] of another shape, which is found before the values are read.
+    pub fn shaped(&self, key: &str, shapes: &[&[usize]]) -> Result<Tensor, FileError> {
+        let accepts = |shape: &[usize]| shapes.is_empty() || shapes.contains(&shape);
+        let expected = || shapes.iter().map(|s| format!("{s:?}")).collect::<Vec<_>>().join(" or ");
+        // A plain number has a value but no shape of its own.
+        let number = |number: Values| match accepts(&[]) {
+            true => Ok(Tensor { shape: vec![], values: number }),
+            false => {
+                Err(self.no_tensor(key, &format!("a plain number where a tensor of shape {} belongs", expected())))
+            }
+        };
         let Place { storage, dtype, offset, shape, strides } = match self.items.get(key) {
-            Some(Item::Tensor(place)) => place,
-            Some(Item::Float(x)) => return Ok(Tensor::f64(&[], vec![*x])),
-            Some(Item::Int(x)) => return Ok(Tensor { shape: vec![], values: Values::I64(vec![*x]) }),
-            Some(Item::Bool(x)) => return Ok(Tensor::u8(&[], vec![u8::from(*x)])),
+            Some(Item::Tensor(place)) if accepts(&place.shape) => place,
+            Some(Item::Tensor(place)) => return Err(self.wrong_shape(key, &place.shape, expected())),
+            Some(Item::Float(x)) => return number(Values::F64(vec![*x])),
+            Some(Item::Int(x)) => return number(Values::I64(vec![*x])),
+            Some(Item::Bool(x)) => return number(Values::U8(vec![u8::from(*x)])),
             Some(Item::Other(found)) => return Err(self.no_tensor(key, &clip(found))),
             None => return Err(self.missing(key)),
         };
@@ -331,26 +349,10 @@ impl PtDict {
             .of_kind(FileErrorKind::Missing)
     }
 
-    /// Reads the tensor under `key`, which must have one of `shapes`, as 32-bit floats.
-    ///
-    /// # Errors
-    /// As [`PtDict::tensor`], and [`FileErrorKind::Content`] of another shape, which is found before the values are read.
-    pub fn f32s(&self, key: &str, shapes: &[&[usize]]) -> Result<Vec<f32>, FileError> {
-        Ok(self.shaped(key, shapes)?.into_f32())
-    }
-
-    /// Reads the tensor under `key`, which must have one of `shapes`, as 64-bit floats.
-    ///
-    /// # Errors
-    /// As [`PtDict::f32s`].
-    pub(crate) fn f64s(&self, key: &str, shapes: &[&[usize]]) -> Result<Vec<f64>, FileError> {
-        Ok(self.shaped(key, shapes)?.into_f64())
-    }
-
     /// Reads a single number: a tensor with one element of any rank, or a plain Python number.
     ///
     /// # Errors
-    /// As [`PtDict::f32s`].
+    /// As [`PtDict::shaped`].
     pub fn scalar(&self, key: &str) -> Result<f64, FileError> {
         let tensor = match self.shape(key) {
             Some(shape) if shape.iter().any(|&n| n != 1) => {
@@ -360,24 +362,6 @@ impl PtDict {
         };
         let shape = tensor.shape.clone();
         tensor.into_f64().first().copied().ok_or_else(|| self.wrong_shape(key, &shape, "a single number".into()))
-    }
-
-    /// The tensor under `key`, which must have one of `shapes`: found out before its values are read.
-    fn shaped(&self, key: &str, shapes: &[&[usize]]) -> Result<Tensor, FileError> {
-        let accepts = |shape: &[usize]| shapes.contains(&shape);
-        let expected = || shapes.iter().map(|s| format!("{s:?}")).collect::<Vec<_>>().join(" or ");
-        match self.shape(key) {
-            Some(shape) if !accepts(shape) => Err(self.wrong_shape(key, shape, expected())),
-            Some(_) => self.tensor(key),
-            // A plain number has a value but no shape of its own.
-            None => {
-                let number = self.tensor(key)?;
-                if accepts(&number.shape) {
-                    return Ok(number);
-                }
-                Err(self.no_tensor(key, &format!("a plain number where a tensor of shape {} belongs", expected())))
-            }
-        }
     }
 
     fn wrong_shape(&self, key: &str, found: &[usize], expected: String) -> FileError {

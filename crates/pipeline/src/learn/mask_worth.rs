@@ -16,7 +16,6 @@ use crate::steps::mask::{MaskChoice, MaskSource};
 use crate::steps::models::Models;
 use crate::steps::recipe::{Recipe, Stage};
 use crate::steps::tool::Tools;
-use touch2touch_core::align::Ask;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::label::agreement;
 use touch2touch_core::metrics::AngleSummary;
@@ -85,7 +84,7 @@ pub fn mask_worth(
         let (Some(tool), Ok(sample)) = (tools.get(tool), dataset.load(pair)) else { continue };
         let touch = Touch { dataset, pair, sample: &sample, tool: Ok(tool), labels: &nothing };
         let Ok(cad) = from_cad(touch, models) else { continue };
-        let estimate = Estimate::new(&recipe).reach_asking(touch, Stage::Pose, Ask::default(), models, &cx.quiet())?;
+        let estimate = Estimate::new(&recipe).without_verdict().reach(touch, Stage::Pose, models, &cx.quiet())?;
         for (pad, proposal) in cad {
             let (Ok(proposal), Some(found)) = (proposal, estimate.contact().masks[pad].as_ref()) else { continue };
             overlaps.extend(agreement(&found.mask, &proposal.mask).map(|agreed| agreed.iou));

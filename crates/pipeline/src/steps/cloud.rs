@@ -58,16 +58,16 @@ impl FingerCloud {
     }
 }
 
-/// The surface points of both fingers of a sample: `parts` holds imprint and mask; a finger without a
-/// camera is left out, and without a mask no point is of contact.
+/// The surface points of both fingers of a sample: a finger without imprint or camera is left out, and without a mask no point
+/// is of contact.
 ///
 /// # Errors
 /// If the sizes differ or the camera's numbers cannot be right.
-pub fn clouds(sample: &Sample, parts: &PerPad<(&DepthMap, Option<&Mask>)>) -> Result<Clouds, TaskError> {
+pub fn clouds(sample: &Sample, imprints: &PerPad<&DepthMap>, masks: &PerPad<&Mask>) -> Result<Clouds, TaskError> {
     let mut clouds = Clouds::default();
     for finger in sample.rig.pads() {
         let camera = sample.pad(finger).and_then(|t| t.camera());
-        let (Some((imprint, mask)), Some(camera)) = (parts[finger], camera) else { continue };
+        let (Some(imprint), mask, Some(camera)) = (imprints[finger], masks[finger], camera) else { continue };
         let lifted = cloud::lift(imprint, camera, None).map_err(|err| TaskError::from_error(WHAT, &err))?;
         if let Some(mask) = mask.filter(|mask| mask.size() != imprint.size()) {
             let why = format!("the mask has {:?} pixels, the imprint {:?}", mask.size(), imprint.size());
@@ -171,8 +171,7 @@ mod tests {
         // Holes within the mask have no point, in either way.
         imprints[lab::LEFT].as_mut().unwrap().as_mut_slice()[5000..9000].fill(f32::NAN);
         let masks: PerPad<Mask> = imprints.clone().map(|i| i.map(|i| i.map(|&d| d.is_nan() || d >= 0.004)));
-        let parts = sample.rig.pads().map(|pad| Some((imprints[pad].as_ref()?, masks[pad].as_ref()))).collect();
-        let surface = clouds(&sample, &parts).unwrap();
+        let surface = clouds(&sample, &imprints.as_ref(), &masks.as_ref()).unwrap();
         let points = contact_points(&sample, &imprints.as_ref(), &masks.as_ref()).unwrap();
         assert!(points.len() > 500 && points == surface.contact_points());
         // A finger without a mask gives none, and none at all is an error.

@@ -10,14 +10,14 @@ use crate::infer::mask::contact_of;
 use crate::io::dataset::Dataset;
 use crate::job::JobCx;
 use crate::labels::{ImprintSource, PairLabels};
-use crate::steps::cloud::{Clouds, contact_points, images};
+use crate::steps::cloud::{Clouds, clouds, contact_points, images};
 use crate::steps::imprint::{imprints_of, measured};
 use crate::steps::mask::{Contact, MaskInputs, contact_mask, no_mask_model};
 use crate::steps::models::Models;
 use crate::steps::pose::{PoseResult, pose};
 use crate::steps::prediction::Prediction;
 use crate::steps::recipe::{Recipe, Stage};
-use touch2touch_core::align::{Ask, Contacts, Register};
+use touch2touch_core::align::{Ask, Contacts, PadImage, Register};
 use touch2touch_core::contact::GEL_CONTACT_M;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::frames::PlanarPose;
@@ -58,6 +58,10 @@ pub struct Estimate {
     /// Pads whose masks cannot be made.
     unmasked: Vec<PadId>,
     contact: Option<Arc<Contact>>,
+    /// All of the surface is lifted, not the contact points alone.
+    whole: bool,
+    /// A pose has no verdict.
+    unjudged: bool,
     surface: Option<Arc<Clouds>>,
     points: Option<Arc<Result<Vec<DVec3>, TaskError>>>,
     pose: Option<Arc<Result<PoseResult, TaskError>>>,
@@ -131,15 +135,16 @@ impl Estimate {
         self.probabilities[pad].is_some()
     }
 
-    /// Itself with all surface points, the contact points marked.
-    ///
-    /// # Errors
-    /// As [`Contact::clouds`].
-    pub fn with_surface(mut self, sample: &Sample) -> Result<Self, TaskError> {
-        if self.surface.is_none() {
-            self.surface = Some(Arc::new(self.contact().clouds(sample)?));
-        }
-        Ok(self)
+    /// Itself with all surface points from [`Stage::Cloud`] on, the contact points marked.
+    #[must_use]
+    pub fn with_surface(self) -> Self {
+        Self { whole: true, ..self }
+    }
+
+    /// Itself with poses that have no verdict, where only the pose counts.
+    #[must_use]
+    pub(crate) fn without_verdict(self) -> Self {
+        Self { unjudged: true, ..self }
     }
 
     /// The pose that one from other imprints is compared with: the true one, or that of the measured imprints of pictures,
@@ -159,7 +164,7 @@ impl Estimate {
         let imprints = touch.sample.pads.clone().map(|touch| Some(touch?.depth()?.imprint.clone()));
         let recipe = Recipe { imprint: ImprintSource::Measured, generator: None, ..recipe.clone() };
         let estimate = Self::with_imprints(&recipe, imprints);
-        let estimate = estimate.reach_asking(touch, Stage::Pose, Ask::default(), models, cx)?;
+        let estimate = estimate.without_verdict().reach(touch, Stage::Pose, models, cx)?;
         Ok(estimate.pose().ok().map(|found| found.grasp_from_object))
     }
 
@@ -188,27 +193,11 @@ impl Estimate {
         estimate
     }
 
-    /// Results of the touch up to a later stage; a pose with its verdict.
+    /// Results of the touch up to a later stage.
     ///
     /// # Errors
-    /// As [`estimate`].
-    pub fn reach(self, touch: Touch<'_>, stage: Stage, models: &Models, cx: &JobCx) -> Result<Self, TaskError> {
-        self.reach_asking(touch, stage, Ask { evidence: true, ..Ask::default() }, models, cx)
-    }
-
-    /// Results up to a later stage, with a request to the registration: to record its steps, or to leave the verdict out
-    /// where only the pose counts.
-    ///
-    /// # Errors
-    /// As [`estimate`].
-    pub(crate) fn reach_asking(
-        mut self,
-        touch: Touch<'_>,
-        stage: Stage,
-        ask: Ask<'_>,
-        models: &Models,
-        cx: &JobCx,
-    ) -> Result<Self, TaskError> {
+    /// As [`estimate`]; with [`Self::with_surface`] also if the points cannot be lifted.
+    pub fn reach(mut self, touch: Touch<'_>, stage: Stage, models: &Models, cx: &JobCx) -> Result<Self, TaskError> {
         let sample = touch.sample;
         for next in Stage::iter().filter(|next| *next <= stage) {
             if self.reached >= Some(next) {
@@ -225,14 +214,38 @@ impl Estimate {
                         ImprintSource::Predicted => imprints_of(&self.predictions, self.recipe.shift, sample)?,
                     });
                 }
-                Stage::Mask => self.contact = Some(Arc::new(self.masks(touch, models)?)),
+                Stage::Mask => {
+                    let (recipe, of) = (self.recipe.mask_recipe(&sample.rig)?, self.recipe.imprint_of());
+                    let labels = self.recipe.hand.then_some(touch.labels);
+                    let inputs = MaskInputs { sample, tool: touch.tool.ok(), labels, of: Some(&of) };
+                    let (imprints, unmasked) = ((*self.imprints).clone(), self.unmasked.clone());
+                    let mut masks = PerPad::default();
+                    for (pad, imprint) in imprints.entries().filter(|(pad, _)| !unmasked.contains(pad)) {
+                        let unet = |imprint: &DepthMap| {
+                            let (found, least) = self.probability(pad, models)?;
+                            Ok(contact_of(&found.0, imprint, least))
+                        };
+                        let found = contact_mask(&recipe, imprint, pad, inputs, unet).map_err(|err| TaskError {
+                            why: format!("{} finger: {}", sample.rig.pad_key(pad), err.why),
+                            ..err
+                        });
+                        masks[pad] = Some(found?);
+                    }
+                    let model = self.recipe.mask_model.as_ref().map(|model| model.name.clone());
+                    self.contact = Some(Arc::new(Contact { imprints, masks, recipe, model }));
+                }
                 Stage::Cloud => {
                     let Contact { imprints, masks, .. } = self.contact();
-                    let masks = masks.as_ref().map(|found| Some(&*found?.mask));
-                    self.points = Some(Arc::new(contact_points(sample, &imprints.as_ref(), &masks)));
+                    let (imprints, masks) = (imprints.as_ref(), masks.as_ref().map(|found| Some(&*found?.mask)));
+                    let surface = if self.whole { Some(clouds(sample, &imprints, &masks)?) } else { None };
+                    // Without any point the reason is asked for.
+                    let points = surface.as_ref().map(Clouds::contact_points).filter(|points| !points.is_empty());
+                    let points = points.map_or_else(|| contact_points(sample, &imprints, &masks), Ok);
+                    (self.points, self.surface) = (Some(Arc::new(points)), surface.map(Arc::new));
                 }
                 Stage::Pose => {
                     let by = self.recipe.registration.method();
+                    let ask = Ask { evidence: !self.unjudged, ..Ask::default() };
                     let tool = touch.tool.map_err(Clone::clone);
                     self.pose = Some(Arc::new(tool.and_then(|tool| self.pose_by(sample, tool, &*by, ask))));
                 }
@@ -258,8 +271,8 @@ impl Estimate {
     ) -> Result<PoseResult, TaskError> {
         let part = pressed_in(sample, tool);
         let of = part.as_ref().unwrap_or(tool);
-        let found =
-            self.with_contacts(sample, |contacts| pose(contacts, of, registration, ask, sample.grasp_from_object))??;
+        let contacts = Contacts { points: self.points().map_err(Clone::clone)?, images: &self.images(sample) };
+        let found = pose(contacts, of, registration, ask, sample.grasp_from_object)?;
         Ok(PoseResult { middle_x_m: tool.middle_x_m, ..found })
     }
 
@@ -276,16 +289,16 @@ impl Estimate {
         tools: impl IntoIterator<Item = (&'t str, &'t ToolModel)>,
         registration: &dyn Register,
     ) -> Result<Vec<Candidate>, TaskError> {
-        self.with_contacts(sample, |contacts| which_tool(contacts, tools, registration))
+        let contacts = Contacts { points: self.points().map_err(Clone::clone)?, images: &self.images(sample) };
+        Ok(which_tool(contacts, tools, registration))
     }
 
-    /// The contact points with the imprints that they are from, as every registration takes them.
-    fn with_contacts<T>(&self, sample: &Sample, of: impl FnOnce(Contacts<'_>) -> T) -> Result<T, TaskError> {
-        let (points, contact) = (self.points().map_err(Clone::clone)?, self.contact());
+    /// The membranes that the contact points are from, for registrations that look at them.
+    fn images<'a>(&'a self, sample: &'a Sample) -> Vec<PadImage<'a>> {
+        let contact = self.contact();
         let masked =
             sample.rig.pads().map(|pad| contact.imprints[pad].as_ref().filter(|_| contact.masks[pad].is_some()));
-        let images = images(sample, &masked.collect(), self.recipe.imprint);
-        Ok(of(Contacts { points, images: &images }))
+        images(sample, &masked.collect(), self.recipe.imprint)
     }
 
     /// Contact probability by the mask model at the imprint of a pad, asked once, and the probability from which on
@@ -306,26 +319,6 @@ impl Estimate {
         };
         let least = self.recipe.mask.probability.unwrap_or(found.1);
         Ok((found, least))
-    }
-
-    fn masks(&mut self, touch: Touch<'_>, models: &Models) -> Result<Contact, TaskError> {
-        let made_by = self.recipe.mask_recipe(&touch.sample.rig)?;
-        let of = self.recipe.imprint_of();
-        let labels = self.recipe.hand.then_some(touch.labels);
-        let inputs = MaskInputs { sample: touch.sample, tool: touch.tool.ok(), labels, of: Some(&of) };
-        let (imprints, unmasked, mut masks) = (self.imprints.clone(), self.unmasked.clone(), PerPad::default());
-        for (pad, imprint) in imprints.entries().filter(|(pad, _)| !unmasked.contains(pad)) {
-            let unet = |imprint: &DepthMap| {
-                let (found, least) = self.probability(pad, models)?;
-                Ok(contact_of(&found.0, imprint, least))
-            };
-            let finger = || touch.sample.rig.pad_key(pad);
-            let found = contact_mask(&made_by, imprint, pad, inputs, unet);
-            let named = |err: TaskError| TaskError { why: format!("{} finger: {}", finger(), err.why), ..err };
-            masks[pad] = Some(found.map_err(named)?);
-        }
-        let model = self.recipe.mask_model.as_ref().map(|model| model.name.clone());
-        Ok(Contact { imprints: (*imprints).clone(), masks, recipe: made_by, model })
     }
 
     /// Bytes held of imprints, masks and points.
@@ -356,7 +349,7 @@ impl Estimate {
     /// All surface points, with the contact points marked.
     ///
     /// # Panics
-    /// Before [`Self::with_surface`].
+    /// Before [`Stage::Cloud`], and not [`Self::with_surface`].
     pub fn surface(&self) -> &Clouds {
         self.surface.as_ref().expect("the surface was asked for")
     }

@@ -10,7 +10,6 @@ use strum::{EnumIter, EnumString, IntoStaticStr};
 
 use crate::error::TaskError;
 use crate::labels::{DrawnMask, ImprintOf, MaskPlace, PairLabels};
-use crate::steps::cloud::{Clouds, clouds};
 use touch2touch_core::bits::Bits;
 use touch2touch_core::contact::{self, ContactMask, LAB_CAD_DISTANCE_M, MaskBasis};
 use touch2touch_core::grid::{DepthMap, Mask};
@@ -321,15 +320,6 @@ impl Contact {
         let note =
             |(pad, found): (PadId, &ContactMask)| Some(format!("{} finger: {}", rig.pad_key(pad), found.basis.note()?));
         self.masks.entries().filter_map(note).collect()
-    }
-
-    /// All surface points of the pair, with the contact points marked.
-    ///
-    /// # Errors
-    /// As [`clouds`].
-    pub fn clouds(&self, sample: &Sample) -> Result<Clouds, TaskError> {
-        let part = |pad| Some((self.imprints[pad].as_ref()?, self.masks[pad].as_ref().map(|found| &*found.mask)));
-        clouds(sample, &sample.rig.pads().map(part).collect())
     }
 }
 

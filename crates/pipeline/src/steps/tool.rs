@@ -12,36 +12,41 @@ use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::pose::ToolModel;
 use touch2touch_core::units::{is_tool_length, scale_to_meters, text_mm};
 
-/// A tool's name and its CAD model with what the registration derives from it.
+/// The CAD model of a tool as its data set has it.
 #[derive(Clone, Debug)]
-pub struct NamedTool {
+pub struct LoadedTool {
     /// The tool's name.
     pub name: String,
-    /// The CAD model, ready for registration.
+    /// The model, ready for registration.
     pub model: ToolModel,
+    /// Oddities of its file.
+    pub notes: Vec<Problem>,
 }
 
-/// The file of a tool's CAD model in a data set, with what is odd about it.
+/// A tool of a data set, with what is odd about its file. Takes some tens of milliseconds.
 ///
 /// # Errors
-/// If there is none, or it cannot be used.
-pub fn tool_file(dataset: &Dataset, name: &str) -> Result<ToolFile, TaskError> {
+/// If it has no CAD file, or that one cannot be used.
+pub fn load_tool(dataset: &Dataset, name: &str) -> Result<LoadedTool, TaskError> {
     let what = format!("CAD model of {name}");
     match dataset.tool_with_notes(name) {
-        Ok(Some(file)) => Ok(file),
+        Ok(Some(ToolFile { mesh, notes })) => {
+            let model = ToolModel::new(mesh).map_err(|err| TaskError::from_error(what, &err))?;
+            Ok(LoadedTool { name: name.to_owned(), model, notes })
+        }
         Ok(None) => Err(TaskError::new(what, format!("there is no {name}.stl, so its grasps have no pose"))
             .with_hint("Put it into tools_stls, in meters and the object frame.")),
         Err(err) => {
-            let units = if err.kind == FileErrorKind::Unit { offer(dataset, name) } else { None };
+            let units = offer(dataset, name, &err).map(Arc::new);
             Err(TaskError { units, ..TaskError::new(what, says(&err)).with_hint(err.hint) })
         }
     }
 }
 
-/// The units in which a tool's CAD file would fit; `None` if there is none.
-fn offer(dataset: &Dataset, tool: &str) -> Option<Arc<UnitOffer>> {
-    let offer = units_of(dataset, tool).ok()?;
-    (!offer.units.is_empty()).then(|| Arc::new(offer))
+/// The units in which a tool's CAD file would fit, where its unit is what is wrong with it; `None` if there is none.
+pub(crate) fn offer(dataset: &Dataset, tool: &str, wrong: &FileError) -> Option<UnitOffer> {
+    let offer = (wrong.kind == FileErrorKind::Unit).then(|| units_of(dataset, tool).ok()).flatten();
+    offer.filter(|offer| !offer.units.is_empty())
 }
 
 /// The units that a tool's CAD file may be in by its size, and what is said of it beside it.
@@ -134,31 +139,12 @@ fn word_for(model: &Path, unit: ToolUnit) -> Option<String> {
     (own == Some(unit.meters())).then(|| "auto".to_owned())
 }
 
-/// A tool with what the registration needs. Takes some tens of milliseconds.
+/// A tool of a mesh, with what the registration needs. Takes some tens of milliseconds.
 ///
 /// # Errors
 /// If the mesh has no area or is not finite.
-pub fn named_tool(name: &str, mesh: TriMesh) -> Result<NamedTool, TaskError> {
-    let model = ToolModel::new(mesh).map_err(|err| TaskError::from_error(format!("CAD model of {name}"), &err))?;
-    Ok(NamedTool { name: name.to_owned(), model })
-}
-
-/// The CAD model of a tool as its data set has it.
-#[derive(Clone, Debug)]
-pub struct LoadedTool {
-    /// The model, ready for registration.
-    pub model: ToolModel,
-    /// Oddities of its file.
-    pub notes: Vec<Problem>,
-}
-
-/// A tool of a data set, with what is odd about its file.
-///
-/// # Errors
-/// As [`tool_file`] and [`named_tool`].
-pub fn load_tool(dataset: &Dataset, name: &str) -> Result<LoadedTool, TaskError> {
-    let ToolFile { mesh, notes } = tool_file(dataset, name)?;
-    Ok(LoadedTool { model: named_tool(name, mesh)?.model, notes })
+pub fn tool_of(name: &str, mesh: TriMesh) -> Result<ToolModel, TaskError> {
+    ToolModel::new(mesh).map_err(|err| TaskError::from_error(format!("CAD model of {name}"), &err))
 }
 
 /// The CAD models of a data set, each read once. One that is not there, or cannot be used, is not looked for again.

@@ -11,7 +11,7 @@ use crate::error::TaskError;
 use crate::io::dataset::Dataset;
 use crate::job::JobCx;
 use crate::labels::ImprintSource;
-use crate::steps::estimate::{Touch, estimate};
+use crate::steps::estimate::{Estimate, Touch};
 use crate::steps::models::Models;
 use crate::steps::pose::PoseResult;
 use crate::steps::prediction::predicted_by;
@@ -174,8 +174,8 @@ pub fn in_space(
     let (mut made, mut notes) = (Vec::new(), Vec::new());
     for &source in pane.sides() {
         let recipe = Recipe { imprint: source, ..recipe.clone() };
-        let estimate = estimate(touch, &recipe, Stage::Pose, models, cx)?;
-        let clouds = estimate.contact().clouds(sample)?;
+        let estimate = Estimate::new(&recipe).with_surface().reach(touch, Stage::Pose, models, cx)?;
+        let clouds = estimate.surface();
         let contact = |f: &crate::steps::cloud::FingerCloud| {
             f.points.iter().zip(&f.contact).filter(|(_, contact)| **contact).map(|(p, _)| *p).collect::<Arc<[DVec3]>>()
         };
@@ -186,7 +186,7 @@ pub fn in_space(
         }
         let pose = estimate.pose().ok().cloned();
         let apart = pose.as_ref().zip(tool.as_ref().ok()).filter(|_| distance_m.is_some());
-        let deviation = apart.map(|(pose, tool)| deviation(&clouds, tool, pose.grasp_from_object));
+        let deviation = apart.map(|(pose, tool)| deviation(clouds, tool, pose.grasp_from_object));
         notes.push(side_note(&recipe, pose.as_ref()));
         let contact = clouds.fingers.as_ref().map(|cloud| cloud.map(contact));
         made.push(SpaceSide { source, contact, membranes, pose, deviation });

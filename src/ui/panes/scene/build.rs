@@ -9,6 +9,7 @@ use super::{Memory, layers, rgb, steps};
 use crate::app::keys::{DatasetSeq, EstimateKey, ImprintKey, ImprintSource};
 use crate::app::results;
 use crate::app::settings::SceneLayer;
+use crate::app::state::Lookup;
 use crate::app::workbench::Layer;
 use crate::gpu::mesh::{Look, MeshItem, MeshStyle, Shading};
 use crate::gpu::points::{CloudItem, CloudStyle, PointColors, PointSize};
@@ -19,7 +20,7 @@ use crate::ui::parts::theme::{self, CONTACT};
 use touch2touch_core::cloud::membrane;
 use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::rig::PerPad;
-use touch2touch_pipeline::steps::cloud::{Clouds, FingerCloud};
+use touch2touch_pipeline::steps::cloud::FingerCloud;
 
 /// Points as the renderer takes them, made once per cloud.
 pub(super) struct SceneCloud {
@@ -48,19 +49,28 @@ pub(super) struct SceneMesh {
     pub mesh: Arc<TriMesh>,
 }
 
-/// Points for the renderer, made again only for another cloud.
-pub(super) fn update_cloud(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource, key: EstimateKey, clouds: &Clouds) {
-    update_surface(cx, memory, source, &key);
-    let held = &mut memory.clouds[source as usize];
-    if held.as_ref().is_some_and(|h| h.key == key) {
-        return;
-    }
-    memory.revision += 1;
+/// Brings what a view draws up to date: points for the renderer are made again only for another cloud.
+pub(super) fn update(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource) {
+    let state = cx.state;
     let contact = |f: &FingerCloud| {
         f.points.iter().zip(&f.contact).filter(|(_, contact)| **contact).map(|(point, _)| *point).collect()
     };
-    let fingers = clouds.fingers.as_ref().map(|cloud| cloud.map(contact));
-    *held = Some(SceneCloud { key, revision: memory.revision, fingers });
+    for side in std::iter::once(source).chain(state.workbench.both_clouds.then(|| source.other())) {
+        let (Lookup::Ready(clouds), Ok(Some(key))) = (results::cloud(state, side), results::cloud_key(state, side))
+        else {
+            continue;
+        };
+        update_surface(cx, memory, side, &key);
+        let held = &mut memory.clouds[side as usize];
+        if held.as_ref().is_none_or(|held| held.key != key) {
+            memory.revision += 1;
+            let fingers = clouds.fingers.as_ref().map(|cloud| cloud.map(contact));
+            *held = Some(SceneCloud { key, revision: memory.revision, fingers });
+        }
+    }
+    update_mesh(cx, &mut memory.mesh, &mut memory.revision);
+    layers::update(cx, memory, source);
+    steps::update(cx, memory, source);
 }
 
 /// The membranes as surfaces, made again only for other imprints.
@@ -86,7 +96,7 @@ fn update_surface(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource, key: 
 }
 
 /// Makes the CAD model for the renderer, where it is another one.
-pub(super) fn update_mesh(cx: &Cx<'_>, held: &mut Option<SceneMesh>, revision: &mut u64) {
+fn update_mesh(cx: &Cx<'_>, held: &mut Option<SceneMesh>, revision: &mut u64) {
     let Some(tool) = results::tool(cx.state).shown() else { return };
     let Some(open) = &cx.state.library.open else { return };
     if held.as_ref().is_some_and(|m| m.key.0 == open.seq && m.key.1 == tool.name) {
@@ -119,7 +129,28 @@ pub(super) fn color(cx: &Cx<'_>, source: ImprintSource, layer: SceneLayer) -> Co
 /// Everything one side shows.
 pub(super) fn scene_of(cx: &Cx<'_>, memory: &Memory, source: ImprintSource) -> SceneData {
     let mut scene = SceneData { background: rgb(cx.p.canvas), eye_dome: true, ..SceneData::default() };
-    clouds(cx, memory, source, &mut scene);
+    let shows = |layer| cx.state.settings.scene.shows(layer);
+    for (side, layer) in [(source, SceneLayer::Contact), (source.other(), SceneLayer::OtherContact)] {
+        let both = cx.state.workbench.both_clouds;
+        // What is of another pair is no comparison.
+        let belongs = |cloud: &&SceneCloud| {
+            side == source || both && results::cloud_key(cx.state, side) == Ok(Some(cloud.key.clone()))
+        };
+        let held = memory.clouds[side as usize].as_ref().filter(|_| shows(layer));
+        let Some(cloud) = held.filter(belongs) else { continue };
+        for (finger, points) in cloud.fingers.entries() {
+            const DIAMETER: PointSize = PointSize::Meters(0.000_35);
+            let (name, color) = (cx.state.finger_name(finger), rgb(color(cx, source, layer)));
+            let mut item = items::contact(&name, (cloud.revision, points.clone()), color, DIAMETER);
+            if side == source {
+                layers::paint(memory, source, finger, &mut item);
+            } else {
+                // The view is fitted to its own side.
+                item.name.insert_str(0, "other ");
+            }
+            scene.clouds.push(item);
+        }
+    }
     if let Some(held) = &memory.surfaces[source as usize] {
         const OPACITY: f32 = 0.4;
         let color = rgb(color(cx, source, SceneLayer::Membrane));
@@ -140,44 +171,12 @@ pub(super) fn scene_of(cx: &Cx<'_>, memory: &Memory, source: ImprintSource) -> S
     scene.clouds.extend(picked.map(|point| one_point("picked", point, cx.p.accent, 11.0)));
     meshes(cx, memory, source, &mut scene);
     steps::add(cx, memory, source, &mut scene);
-    if cx.state.settings.scene.shows(SceneLayer::Guides) {
+    if shows(SceneLayer::Guides) {
         let (ground, ink) = (rgb(cx.p.canvas), rgb(cx.p.weak));
         scene.floor = Some(items::floor(ground, ink));
         scene.lines.extend(items::guides(ground, ink, u64::from(*cx.p == theme::DARK)));
     }
     scene
-}
-
-/// The contact points of one finger, in one color.
-fn contact(finger: &str, revision: u64, points: &Arc<[DVec3]>, color: Color32) -> CloudItem {
-    const DIAMETER_M: f32 = 0.000_35;
-    items::contact(finger, (revision, points.clone()), rgb(color), PointSize::Meters(DIAMETER_M))
-}
-
-/// The contact points of both fingers, and those of the other side where both are shown in one view.
-fn clouds(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, scene: &mut SceneData) {
-    let shows = |layer| cx.state.settings.scene.shows(layer);
-    if let Some(cloud) = memory.clouds[source as usize].as_ref().filter(|_| shows(SceneLayer::Contact)) {
-        for (finger, points) in cloud.fingers.entries() {
-            let color = color(cx, source, SceneLayer::Contact);
-            let mut item = contact(&cx.state.finger_name(finger), cloud.revision, points, color);
-            layers::paint(memory, source, finger, &mut item);
-            scene.clouds.push(item);
-        }
-    }
-    let other = source.other();
-    let shown = cx.state.workbench.both_clouds && shows(SceneLayer::OtherContact);
-    // What is of another pair is no comparison.
-    let same_pair = |cloud: &&SceneCloud| results::cloud_key(cx.state, other) == Ok(Some(cloud.key.clone()));
-    if let Some(cloud) = memory.clouds[other as usize].as_ref().filter(|_| shown).filter(same_pair) {
-        for (finger, points) in cloud.fingers.entries() {
-            let color = color(cx, source, SceneLayer::OtherContact);
-            let mut item = contact(&cx.state.finger_name(finger), cloud.revision, points, color);
-            // The view is fitted to its own side.
-            item.name.insert_str(0, "other ");
-            scene.clouds.push(item);
-        }
-    }
 }
 
 /// A cloud of a single point, as large on the screen at any distance.

@@ -22,7 +22,7 @@ use touch2touch_core::rig::{PerPad, Rig};
 use touch2touch_core::sample::DepthCamera;
 
 use super::cad::{CAD_FOLDER, cad_files};
-use super::{Files, Loaded, Scan, Source, SourceKind, last_integer, problem, same_name};
+use super::{Files, Scan, Source, SourceKind, last_integer, problem, same_name};
 
 const BUBBLES: &str = "bubbles";
 const GELSLIMS: [&str; 2] = ["gelslims", "gelslims_no_distortion"];
@@ -370,11 +370,7 @@ impl Scanner {
 impl PairFiles {
     /// The cameras of a bubble file.
     pub(super) fn cameras(bubble: &Path) -> Result<PerPad<DepthCamera>, FileError> {
-        let sample = load::pair(None, Some(bubble))?.sample;
+        let sample = Self { gelslim: None, bubble: Some(bubble.to_owned()) }.load()?.sample;
         Ok(sample.pads.map(|touch| touch?.depth()?.camera.clone()))
-    }
-
-    pub(super) fn load(&self) -> Result<Loaded, FileError> {
-        load::pair(self.gelslim.as_deref(), self.bubble.as_deref())
     }
 }

@@ -159,11 +159,11 @@ pub(crate) fn write_beside(model: &Path, word: &str) -> std::io::Result<()> {
 
 /// A CAD model that can be worked with.
 #[derive(Clone, Debug, PartialEq)]
-pub struct ToolFile {
+pub(crate) struct ToolFile {
     /// The model in meters.
-    pub mesh: TriMesh,
+    pub(crate) mesh: TriMesh,
     /// Oddities of its file.
-    pub notes: Vec<Problem>,
+    pub(crate) notes: Vec<Problem>,
 }
 
 /// Reads a CAD model and brings it to meters: by `scale`, else as [`UNIT_FILE`] beside it says, else as it is. The one

@@ -10,7 +10,6 @@ use crate::steps::estimate::{Estimate, Touch};
 use crate::steps::models::Models;
 use crate::steps::recipe::Stage;
 use crate::steps::tool::Tools;
-use touch2touch_core::align::Ask;
 use touch2touch_core::grid::{DepthMap, Grid};
 use touch2touch_core::metrics::AngleSummary;
 use touch2touch_core::rig::PerPad;
@@ -52,8 +51,8 @@ pub(super) fn angles(
         for (touch, picture) in grasp.iter().zip(own) {
             imprints[touch.of_sample] = picture.map(|picture| touch.imprint(picture));
         }
-        let estimate = Estimate::of_imprints(&setup.recipe, imprints);
-        let estimate = estimate.reach_asking(touch, Stage::Pose, Ask::default(), models, cx);
+        let estimate = Estimate::of_imprints(&setup.recipe, imprints).without_verdict();
+        let estimate = estimate.reach(touch, Stage::Pose, models, cx);
         let found = estimate.ok().and_then(|estimate| Some(estimate.pose().ok()?.angle_rad));
         errors.push(found.map_or(f64::NAN, |found| angle_error(found, truth.inverse().theta_rad)));
     }

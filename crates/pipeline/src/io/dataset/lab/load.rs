@@ -6,7 +6,7 @@ use glam::DAffine3;
 
 use crate::io::dataset::{InvalidPixels, Loaded, colors, most_invalid, plausible, problem};
 use crate::io::error::{FileError, FileErrorKind};
-use crate::io::pt::{PtDict, read_dict};
+use crate::io::pt::{PtDict, Tensor, read_dict};
 use touch2touch_core::dataset::Problem;
 use touch2touch_core::frames::{PlanarPose, affine_from_xyz_quat};
 use touch2touch_core::grid::{DepthMap, Grid};
@@ -14,6 +14,7 @@ use touch2touch_core::rig::{PadId, Rig, lab};
 use touch2touch_core::sample::{ColorTouch, DepthCamera, DepthTouch, DepthTruth, PadTouch, Sample};
 use touch2touch_core::sensor::Intrinsics;
 
+use super::PairFiles;
 use super::mirrored::{UNIT_TOLERANCE, recover};
 
 const BUBBLE_SHAPE: [usize; 4] = [2, 1, lab::BUBBLE.height, lab::BUBBLE.width];
@@ -23,43 +24,45 @@ const NO_DEPTH_M: f32 = 1e-4;
 /// Two halves of one grasp store the same pose; this allows for 32-bit copies of it.
 const SAME_POSE: f64 = 1e-5;
 
-/// Loads one pair; either half may be absent.
-pub(super) fn pair(gelslim_file: Option<&Path>, bubble_file: Option<&Path>) -> Result<Loaded, FileError> {
-    let mut notes = Vec::new();
-    let mut invalid = [InvalidPixels::default(); 2];
-    let mut fingers = [PadTouch::default(), PadTouch::default()];
-    let mut poses: Vec<(&Path, [f64; 3])> = Vec::new();
-    if let Some(path) = bubble_file {
-        let dict = read_dict(path)?;
-        say_coarse(&dict, &mut notes);
-        for (finger, touch) in fingers.iter_mut().zip(bubble_touches(&dict, &mut notes, &mut invalid)?) {
-            finger.set(lab::BUBBLE_ID, touch);
+impl PairFiles {
+    /// Loads one pair; either half may be absent.
+    pub(in super::super) fn load(&self) -> Result<Loaded, FileError> {
+        let mut notes = Vec::new();
+        let mut invalid = [InvalidPixels::default(); 2];
+        let mut fingers = [PadTouch::default(), PadTouch::default()];
+        let mut poses: Vec<(&Path, [f64; 3])> = Vec::new();
+        if let Some(path) = self.bubble.as_deref() {
+            let dict = read_dict(path)?;
+            say_coarse(&dict, &mut notes);
+            for (finger, touch) in fingers.iter_mut().zip(bubble_touches(&dict, &mut notes, &mut invalid)?) {
+                finger.set(lab::BUBBLE_ID, touch);
+            }
+            poses.extend(pose(&dict, &mut notes)?.map(|p| (path, p)));
         }
-        poses.extend(pose(&dict, &mut notes)?.map(|p| (path, p)));
-    }
-    if let Some(path) = gelslim_file {
-        let dict = read_dict(path)?;
-        for (finger, touch) in fingers.iter_mut().zip(gelslim_touches(&dict, &mut notes)?) {
-            finger.set(lab::GELSLIM_ID, touch);
+        if let Some(path) = self.gelslim.as_deref() {
+            let dict = read_dict(path)?;
+            for (finger, touch) in fingers.iter_mut().zip(gelslim_touches(&dict, &mut notes)?) {
+                finger.set(lab::GELSLIM_ID, touch);
+            }
+            // Where the bubble file has a pose, that one counts and this one is only compared.
+            let mut ignored = Vec::new();
+            let here = pose(&dict, if poses.is_empty() { &mut notes } else { &mut ignored })?;
+            poses.extend(here.map(|p| (path, p)));
         }
-        // Where the bubble file has a pose, that one counts and this one is only compared.
-        let mut ignored = Vec::new();
-        let here = pose(&dict, if poses.is_empty() { &mut notes } else { &mut ignored })?;
-        poses.extend(here.map(|p| (path, p)));
+        if let [(a, first), (b, second)] = &poses[..]
+            && first.iter().zip(second).any(|(x, y)| (x - y).abs() > SAME_POSE)
+        {
+            notes.push(problem(
+                *b,
+                format!("theta, x, y {second:?} differ from {first:?} in {}", a.display()),
+                "the two halves are from different grasps; check how the files were named",
+            ));
+        }
+        let grasp_from_object =
+            poses.first().map(|(_, [theta, x, y])| PlanarPose::object_from_grasp_of_lab(*theta, *x, *y).inverse());
+        let sample = Sample { pads: fingers.map(Some).into(), grasp_from_object, notes, ..Sample::default() };
+        Ok(Loaded { sample, invalid: invalid.map(Some).into() })
     }
-    if let [(a, first), (b, second)] = &poses[..]
-        && first.iter().zip(second).any(|(x, y)| (x - y).abs() > SAME_POSE)
-    {
-        notes.push(problem(
-            *b,
-            format!("theta, x, y {second:?} differ from {first:?} in {}", a.display()),
-            "the two halves are from different grasps; check how the files were named",
-        ));
-    }
-    let grasp_from_object =
-        poses.first().map(|(_, [theta, x, y])| PlanarPose::object_from_grasp_of_lab(*theta, *x, *y).inverse());
-    let sample = Sample { pads: fingers.map(Some).into(), grasp_from_object, notes, ..Sample::default() };
-    Ok(Loaded { sample, invalid: invalid.map(Some).into() })
 }
 
 /// A value that the sample can do without: absent, or no tensor, is a note; wrong is an error.
@@ -125,13 +128,15 @@ fn bubble_touches(
     notes: &mut Vec<Problem>,
     invalid: &mut [InvalidPixels; 2],
 ) -> Result<[DepthTouch; 2], FileError> {
-    let imprint = dict.f32s("bubble_imprint", &[&BUBBLE_SHAPE])?;
+    let imprint = dict.shaped("bubble_imprint", &[&BUBBLE_SHAPE])?.into_f32();
     let without = "points cannot be lifted to the grasp frame";
-    let reference = optional(dict, dict.f32s("bubble_depth_ref", &[&BUBBLE_SHAPE]), without, notes)?;
+    let reference =
+        optional(dict, dict.shaped("bubble_depth_ref", &[&BUBBLE_SHAPE]), without, notes)?.map(Tensor::into_f32);
     let cameras = cameras(dict, without, notes)?;
     // Only the simulator writes these two.
     let truth = if dict.has("contact_mask") && dict.has("imprint_clean") {
-        Some((dict.f32s("contact_mask", &[&BUBBLE_SHAPE])?, dict.f32s("imprint_clean", &[&BUBBLE_SHAPE])?))
+        let [contact, clean] = ["contact_mask", "imprint_clean"].map(|key| dict.shaped(key, &[&BUBBLE_SHAPE]));
+        Some((contact?.into_f32(), clean?.into_f32()))
     } else {
         None
     };
@@ -195,10 +200,11 @@ type Camera = (Intrinsics, DAffine3);
 ///
 /// Source: `ICP_dataset_cal.py` lines 222-240 and 443-463: both poses are given in the arm's base frame.
 fn cameras(dict: &PtDict, without: &str, notes: &mut Vec<Problem>) -> Result<[Option<Camera>; 2], FileError> {
-    let k = optional(dict, dict.f64s("K", &[&[2, 3, 3], &[2, 1, 3, 3]]), without, notes)?;
-    let bubbles = optional(dict, dict.f64s("bubbles_tr_quat", &[&[2, 1, 7], &[2, 7]]), without, notes)?;
-    let grasp = optional(dict, dict.f64s("grasp_frame_quat", &[&[1, 7], &[7], &[1, 1, 7]]), without, notes)?;
+    let k = optional(dict, dict.shaped("K", &[&[2, 3, 3], &[2, 1, 3, 3]]), without, notes)?;
+    let bubbles = optional(dict, dict.shaped("bubbles_tr_quat", &[&[2, 1, 7], &[2, 7]]), without, notes)?;
+    let grasp = optional(dict, dict.shaped("grasp_frame_quat", &[&[1, 7], &[7], &[1, 1, 7]]), without, notes)?;
     let (Some(k), Some(bubbles), Some(grasp)) = (k, bubbles, grasp) else { return Ok([None, None]) };
+    let [k, bubbles, grasp] = [k, bubbles, grasp].map(Tensor::into_f64);
     let Some((base_from_grasp, length)) = rigid(&grasp) else {
         notes.push(no_frame(dict, "grasp_frame_quat", &grasp, without));
         return Ok([None, None]);
@@ -263,6 +269,6 @@ fn not_unit(dict: &PtDict, key: &str, length: f64, how: &str) -> Problem {
 
 fn gelslim_touches(dict: &PtDict, notes: &mut Vec<Problem>) -> Result<[ColorTouch; 2], FileError> {
     let keys = ["gelslim", "gelslim_ref"];
-    let [raw, reference] = keys.map(|key| dict.f32s(key, &[&GELSLIM_SHAPE]));
-    colors::touches(dict.file(), keys, [raw?, reference?], [0, 1], notes)
+    let [raw, reference] = keys.map(|key| dict.shaped(key, &[&GELSLIM_SHAPE]));
+    colors::touches(dict.file(), keys, [raw?.into_f32(), reference?.into_f32()], [0, 1], notes)
 }
