@@ -151,7 +151,7 @@ fn labels_saved_to_a_folder_are_ordinary_ones_and_can_be_taken_in() {
     assert_eq!(there.load_review("a").unwrap().unwrap().review, Review::InProgress.stored());
     let found = take_in(&dataset, &labels, &folder).unwrap();
     assert_eq!(found.pairs, ["a"]);
-    assert!(found.failed[0].why.contains("c is no pair"), "{found:?}");
+    assert!(found.failed[0].why.contains("c is not a pair"), "{found:?}");
     assert!(at(&Labels::of(&dataset).load("a").unwrap(), 3));
     let why = take_in(&dataset, &labels, dir.path()).unwrap_err();
     assert!(why.why.contains("recovered.json"), "{why}");

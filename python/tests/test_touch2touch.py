@@ -122,7 +122,7 @@ def test_points_alone_are_registered(pair):
     assert np.array_equal(many[0].matrix, pose.matrix) and many[2] is None
     with pytest.raises(t2t.Refused, match="N x 3"):
         t2t.register(points[:, :2].copy(), tool)
-    with pytest.raises(ValueError, match="is no registration"):
+    with pytest.raises(ValueError, match="unknown registration"):
         t2t.register(points, tool, engine="nearest")
     with pytest.raises(ValueError):
         t2t.register(np.full((20, 3), np.nan), tool)

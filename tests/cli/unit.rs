@@ -37,7 +37,7 @@ fn a_model_in_millimeters_is_said_and_accepted_for_good() {
     // A unit in which it is no tool changes nothing; the right one is for all models of the folder.
     let wrong = set_to("um");
     assert!(wrong.status.code() == Some(2) && said().is_none(), "{}", error_text(&wrong));
-    assert!(error_text(&wrong).contains("no tool") && error_text(&wrong).contains("millimeters"));
+    assert!(error_text(&wrong).contains("not a tool") && error_text(&wrong).contains("millimeters"));
     let done = set_to("mm");
     assert!(done.status.success(), "{}", error_text(&done));
     let word = json(&done)["set"][0]["word"].clone();

@@ -113,7 +113,7 @@ pub(super) fn pt() -> Vec<Seed> {
             "numbers and texts",
             dict(&[("theta", PtItem::Float(1.5)), ("t", PtItem::Texts(vec!["a".into(), "b".into()]))]),
         ),
-        bad("a plain pickle", Content::Raw(b"\x80\x02}X\x01\x00\x00\x00aK\x01s.".to_vec()), "no zip archive"),
+        bad("a plain pickle", Content::Raw(b"\x80\x02}X\x01\x00\x00\x00aK\x01s.".to_vec()), "not a zip archive"),
         bad("a bomb of nothing", pickled(many(b"N", 4 << 20)), "list of contents is longer"),
         bad("a bomb of dicts", pickled(many(b"}", 1_000_000)), "would take more"),
         bad("a bomb of marks", pickled(many(b"(", 1_000_000)), "would take more"),
@@ -123,7 +123,7 @@ pub(super) fn pt() -> Vec<Seed> {
         bad(
             "an old archive",
             Content::Raw([vec![0; 257], b"ustar\x0000".to_vec(), vec![0; 248]].concat()),
-            "no zip archive",
+            "not a zip archive",
         ),
         bad("empty", text(""), "empty"),
     ]
