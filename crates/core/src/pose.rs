@@ -240,7 +240,7 @@ mod tests {
         }
         assert_eq!(gated.to_string(), "distance_field:gate=0.3");
         for (text, word) in [
-            ("nearest", "is no registration"),
+            ("nearest", "unknown registration"),
             ("distance_field:gate=0", "between 0.01 and 50 mm"),
             ("distance_field:gate=NaN", "between 0.01 and 50 mm"),
             ("distance_field:gate=", "not a number"),

@@ -240,14 +240,14 @@ mod tests {
     #[test]
     fn what_makes_no_sense_is_refused_in_words() {
         for (text, word) in [
-            ("", "none of measured"),
+            ("", "unknown side"),
             ("measured:seed=3", "no such choice"),
             ("prediction:seeds=3", "no such choice"),
             ("prediction:seed=-1", "cannot be"),
             ("prediction:steps=0", "cannot be"),
             ("prediction:shift=other", "cannot be"),
             ("prediction:seed", "KEY=VALUE"),
-            ("prediction:colour=red", "none of bundle"),
+            ("prediction:colour=red", "choose from bundle"),
             ("mean:seeds=99", "cannot be"),
             ("prediction:bundle=\"a, b", "cannot be"),
         ] {

@@ -14,7 +14,7 @@ const VERSION: &str = "v1";
 /// Values of the choices that are not named. Part of the format: a choice that is new gets a line with what was done
 /// without it, and no line ever changes.
 const UNNAMED: &str = r#"{
-    "steps": 50, "eta": 0.0, "seed": 42, "sampler": "ddim", "spacing": "trailing", "guidance": 1.0, "shift": "exact_inverse"
+    "steps": 50, "eta": 0.0, "seed": 42, "sampler": "ddim", "spacing": "trailing", "shift": "exact_inverse"
 }"#;
 
 /// All that decides a predicted imprint of a touch, apart from the engine: the identity of the generator's bundle, the choices
@@ -52,8 +52,8 @@ impl PredictedId {
     pub fn parts(&self) -> Option<(&str, GenerateConfig, ShiftMode)> {
         let (bundle, choices) = self.0.split_once(' ')?;
         let named: Map<String, Value> = serde_json::from_str(choices.strip_prefix(VERSION)?).ok()?;
-        // What was made with a choice that there is no longer cannot be made again.
-        if named.contains_key("guidance") || named.get("sampler").is_some_and(|sampler| sampler == "dpm_solver2m") {
+        // A sampler that there is no longer: old preferences read it as another one, which would be another prediction.
+        if named.get("sampler").is_some_and(|sampler| sampler == "dpm_solver2m") {
             return None;
         }
         let mut all = unnamed();

@@ -122,7 +122,7 @@ mod tests {
         let whole = file(true, 16, 1, 1, &[0; 12]);
         for bytes in [&whole[..whole.len() - 1], &whole[..40], b"no", b""] {
             let why = read(bytes).unwrap_err();
-            assert!(why.contains("no TIFF that can be read") && why.contains("a.tif"), "{why}");
+            assert!(why.contains("not a readable TIFF") && why.contains("a.tif"), "{why}");
         }
         let why = read(&file(true, 32, 1, 1, &[0; 24])).unwrap_err();
         assert!(why.contains("other numbers"), "{why}");

@@ -286,7 +286,7 @@ mod tests {
             write(&path, unit);
             for scale in [None, Some(ToolScale::Auto), Some(ToolScale::Meters), Some(ToolScale::Factor(1.0))] {
                 let error = read_tool(&path, scale).unwrap_err();
-                assert!(error.what.contains("no tool") && error.to_string().contains("t.stl"), "{error}");
+                assert!(error.what.contains("not a tool") && error.to_string().contains("t.stl"), "{error}");
                 assert!(error.to_string().len() < 200 + path.as_os_str().len(), "{error}");
             }
         }
