@@ -8,7 +8,7 @@ use super::template::template;
 use super::*;
 use crate::align::batch::{Cloud, State};
 use crate::align::search::Cost;
-use crate::align::{Contacts, Evidence, PadImage, Prior, Uncertainty};
+use crate::align::{Contacts, Evidence, PadImage, Prior, Rung, Uncertainty};
 use crate::catalog::tools;
 use crate::cloud::lift;
 use crate::grid::{DepthMap, Mask};
