@@ -73,7 +73,11 @@ fn where_a_provider_computes_otherwise_the_processor_goes_on_and_says_so() {
     assert!(error_text(&automatic).contains("it runs on the processor"), "{}", error_text(&automatic));
     assert!(!error_text(&automatic).contains("differs from the processor by 0.0"), "{}", error_text(&automatic));
     let named = masked("openvino");
-    assert!(!named.status.success() && error_text(&named).contains("differs from the processor"), "{}", error_text(&named));
+    assert!(
+        !named.status.success() && error_text(&named).contains("differs from the processor"),
+        "{}",
+        error_text(&named)
+    );
     // What it computes alike is taken.
     let checked = run(&["bundle", "check", &tiny("mask").display().to_string(), "--json"], &library, home.path());
     assert_eq!(json(&checked)["engines"], serde_json::json!(["rten", "ort", "openvino"]));

@@ -32,7 +32,7 @@ use touch2touch_pipeline::io::npz;
 use touch2touch_pipeline::io::pt::{Tensor, Values};
 use touch2touch_pipeline::io::stl;
 
-pub use simulated::{Suite, stratum};
+pub use simulated::{Suite, spoilt, stratum};
 
 /// Difficulty of a case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, strum::EnumIter, strum::Display)]

@@ -6,6 +6,7 @@ mod doctor;
 mod figures;
 mod front;
 mod generator;
+mod grasps;
 mod json;
 mod peers;
 mod registration;
@@ -44,6 +45,8 @@ enum Benchmark {
     Cases(cases::CasesArgs),
     /// Number of data sets stored wrongly that the doctor names rightly, and of sound ones that it doubts.
     Doctor(doctor::DoctorArgs),
+    /// Poses, answers and verdicts of grasps at any turn and place, and of the lab's.
+    Grasps(grasps::GraspsArgs),
     /// Signs of a fault that need no truth (a wrong tool, swapped fingers, a turned camera), each as a detector.
     Verdict(verdict::VerdictArgs),
     /// Write training data for the networks: a data set or, with `simulator` as PATH, simulated touches, as shards that
@@ -65,6 +68,7 @@ fn run(benchmark: &Benchmark) -> VerbResult {
     match benchmark {
         Benchmark::Registration(args) => registration::run(args),
         Benchmark::Generator(args) => generator::run(args),
+        Benchmark::Grasps(args) => grasps::run(args),
         Benchmark::Cases(args) => cases::run(args),
         Benchmark::Doctor(args) => doctor::run(args),
         Benchmark::TrainingData(args) => training_data::run(args),

@@ -95,8 +95,12 @@ const OFF: Limits = [0.5, f64::INFINITY];
 /// Standard deviation of the place where it is known least, meters.
 const PLACE_SD_M: Limits = [PLACE_OPEN_M, f64::INFINITY];
 
-/// Signs of another tool, or of a touch that is none of this one, that together say what the range does not where it is wide.
-const TOGETHER: usize = 3;
+/// Limits of one minus likeness plus these shares of what else speaks against a tool, each by its weight, where it was looked for
+/// among all poses: any tool then fits somewhere, and no one sign tells it. From other tools at fresh grasps.
+const ANYWHERE: Limits = [0.55, 0.75];
+const ANYWHERE_OFF: f64 = 1.5;
+const ANYWHERE_ELSEWHERE: f64 = 2.0;
+const ANYWHERE_SWAPPED: f64 = 0.5;
 /// Chance of the answer below which another one is told.
 const LIKELIEST: f64 = 0.5;
 
@@ -167,16 +171,6 @@ impl Verdict {
     fn with_place(report: &AlignReport, evidence: &Evidence, place_m: f64) -> Self {
         let mut against = signs(report, evidence, place_m);
         against.retain(|sign| sign.grade > Grade::Good);
-        let unlike = |sign: &&Sign| {
-            use SignKind::{Elsewhere, Fingers, Misfit, OffTool, Swapped};
-            matches!(sign.kind, Elsewhere | Fingers | Misfit | OffTool | Swapped)
-        };
-        if report.range != Range::default()
-            && against.iter().filter(unlike).count() >= TOGETHER
-            && let Some(misfit) = against.iter_mut().find(|sign| sign.kind == SignKind::Misfit)
-        {
-            misfit.grade = Grade::Wrong;
-        }
         against.sort_by_key(|sign| std::cmp::Reverse(sign.grade));
         let (grade, why) = match against.first() {
             Some(sign) => (sign.grade, sign.what.clone()),
@@ -232,7 +226,13 @@ fn signs(report: &AlignReport, evidence: &Evidence, place_m: f64) -> Vec<Sign> {
         }
         let what = format!("the membranes fit better {} away: check the mask", way(membrane.own));
         sign(Elsewhere, Grade::of(membrane.own.gain, limits.elsewhere), what);
-        let grade = Grade::of(1.0 - membrane.likeness + OFF_COUNTS * off.min(OFF_CAP), limits.misfit);
+        let (unlike, off_tool) = (1.0 - membrane.likeness, off.min(OFF_CAP));
+        let grade = if report.range != Range::default() && report.joint.is_some_and(|fit| fit.basis.has_membrane()) {
+            let others = ANYWHERE_ELSEWHERE * membrane.own.gain + ANYWHERE_SWAPPED * membrane.swapped.unwrap_or(0.0);
+            Grade::of(unlike + ANYWHERE_OFF * off_tool + others, ANYWHERE)
+        } else {
+            Grade::of(unlike + OFF_COUNTS * off_tool, limits.misfit)
+        };
         let (likeness, off) = (membrane.likeness, percent(off));
         let what = format!("the contact does not match this tool (similarity {likeness:.2}, {off} of it off the tool)");
         sign(Misfit, grade, what);

@@ -123,42 +123,46 @@ impl Suite {
         }
         let tool = (tool + position % 2 * plain) % tools.len();
         let sample = condition.simulate(&tools[tool], sim::random_grasp(rng.random()), rng.random(), &config);
-        let corruption = if stratum == Stratum::Hard { Corruption::hard() } else { Corruption::nominal() };
-        let mask_seed: u64 = rng.random();
-        // Of the degenerate cases, three of four have one blank finger, either one equally often.
-        let blank = (stratum == Stratum::Degenerate && rng.random_bool(0.75)).then(|| rng.random_range(0..2));
-        let touch = |finger: PadId| {
-            let touch = sample.pad(finger).and_then(|t| t.depth());
-            touch.expect("the simulator presses both fingers")
-        };
-        let camera = |finger| touch(finger).camera.clone().expect("the simulator's bubbles have cameras");
-        let clean =
-            lab::PADS.map(|f| touch(f).truth.as_ref().expect("the simulator knows the contact").contact.clone());
-        let mut masks = lab::PADS.map(|f| corrupt(&clean[f.index()], &corruption, f, mask_seed));
-        if let Some(finger) = blank {
-            let finger: usize = finger;
-            masks[finger].as_mut_slice().fill(false);
-        }
-        let mut imprints = lab::PADS.map(|f| touch(f).imprint.clone());
-        for (f, imprint) in imprints.iter_mut().enumerate() {
-            let reference = camera(lab::PADS[f]).depth_reference;
-            for (value, reference) in imprint.as_mut_slice().iter_mut().zip(reference.as_slice()) {
-                if rng.random_bool(DROPPED) {
-                    *value = if f == 0 { *reference } else { f32::NAN };
-                }
+        let case = spoilt(&sample, tool, stratum, &mut rng);
+        (sample, case)
+    }
+}
+
+/// Case of a simulated touch: masks as a learned model has them, and pixels without depth.
+pub fn spoilt(sample: &Sample, tool: usize, stratum: Stratum, rng: &mut ChaCha8Rng) -> Case {
+    let corruption = if stratum == Stratum::Hard { Corruption::hard() } else { Corruption::nominal() };
+    let mask_seed: u64 = rng.random();
+    // Of the degenerate cases, three of four have one blank finger, either one equally often.
+    let blank = (stratum == Stratum::Degenerate && rng.random_bool(0.75)).then(|| rng.random_range(0..2));
+    let touch = |finger: PadId| {
+        let touch = sample.pad(finger).and_then(|t| t.depth());
+        touch.expect("the simulator presses both fingers")
+    };
+    let camera = |finger| touch(finger).camera.clone().expect("the simulator's bubbles have cameras");
+    let clean = lab::PADS.map(|f| touch(f).truth.as_ref().expect("the simulator knows the contact").contact.clone());
+    let mut masks = lab::PADS.map(|f| corrupt(&clean[f.index()], &corruption, f, mask_seed));
+    if let Some(finger) = blank {
+        let finger: usize = finger;
+        masks[finger].as_mut_slice().fill(false);
+    }
+    let mut imprints = lab::PADS.map(|f| touch(f).imprint.clone());
+    for (f, imprint) in imprints.iter_mut().enumerate() {
+        let reference = camera(lab::PADS[f]).depth_reference;
+        for (value, reference) in imprint.as_mut_slice().iter_mut().zip(reference.as_slice()) {
+            if rng.random_bool(DROPPED) {
+                *value = if f == 0 { *reference } else { f32::NAN };
             }
         }
-        let case = Case {
-            imprints,
-            predicted: false,
-            cameras: lab::PADS.map(camera),
-            masks,
-            masks_clean: clean,
-            grasp_from_object: sample.grasp_from_object.expect("the simulator knows the pose"),
-            tool,
-            stratum,
-        };
-        (sample, case)
+    }
+    Case {
+        imprints,
+        predicted: false,
+        cameras: lab::PADS.map(camera),
+        masks,
+        masks_clean: clean,
+        grasp_from_object: sample.grasp_from_object.expect("the simulator knows the pose"),
+        tool,
+        stratum,
     }
 }
 

@@ -24,7 +24,7 @@ mod turned;
 use serde::{Deserialize, Serialize};
 
 use super::register::check_overlap;
-use super::{AlignConfig, AlignError, AlignReport, Ask, Outcome, Prior, Range, Register, Rung, RungAttempt, Scene};
+use super::{AlignConfig, AlignError, AlignReport, Ask, Prior, Range, Register, Scene};
 use crate::frames::PlanarPose;
 use crate::tool::ToolModel;
 pub use answers::PoseAnswer;
@@ -137,20 +137,15 @@ impl Register for JointConfig {
         }
         let mut answer = problem.solve(self.is_wider());
         if problem.predicted && answer.fit.explained < PREDICTED_EXPLAINED {
-            return by_mask(JointFit { basis: Basis::Unlike, mask_weight: 1.0, ..answer.fit });
+            let fit = JointFit { basis: Basis::Unlike, mask_weight: 1.0, ..answer.fit };
+            return by_mask_from(fit, &problem.start_around(&answer));
         }
-        if answer.fit.explained < DOUBTFUL && answer.rung != Rung::Around {
+        if answer.fit.explained < DOUBTFUL && !self.is_wider() {
             // A bad mask can lead all scouts away from what the membrane shows plainly.
             answer = problem.solve_without_mask(&answer, EXPLAINED).unwrap_or(answer);
         }
-        if answer.fit.explained < EXPLAINED {
-            let fit = JointFit { basis: Basis::LittleContact, mask_weight: 1.0, ..answer.fit };
-            let (found, around) = (by_mask(fit), problem.start_around(&answer));
-            // The mask alone may have no answer in the prior either.
-            let settled = |end: &RungAttempt| end.outcome == Outcome::Accepted || end.rung < Rung::Grid;
-            let stands =
-                around.is_empty() || found.as_ref().is_ok_and(|found| found.ladder.last().is_some_and(settled));
-            return if stands { found } else { by_mask_from(fit, &around) };
+        if answer.fit.explained < EXPLAINED && !self.is_wider() {
+            return by_mask(JointFit { basis: Basis::LittleContact, mask_weight: 1.0, ..answer.fit });
         }
         Ok(problem.report(scene.yz(), answer))
     }

@@ -12,9 +12,9 @@ use crate::symmetry::Symmetry;
 use crate::units::angle_error;
 
 /// Share of the difference of costs that counts: model errors make costs differ by more than noise does. From fresh grasps.
-const COUNTS: f64 = 0.25;
+const COUNTS: f64 = 0.12;
 /// Least weight of an answer that is told.
-const LEAST: f64 = 0.02;
+const LEAST: f64 = 0.1;
 /// Ends at most this far apart are one: radians, meters. Farther ones are where the cost between them is hardly higher, as a
 /// share: a tool that slides along itself.
 const SAME_RAD: f64 = 4.0 / 180.0 * std::f64::consts::PI;
@@ -26,7 +26,7 @@ const VALLEY: f64 = 0.02;
 pub struct PoseAnswer {
     /// The tool in the hand.
     pub grasp_from_object: PlanarPose,
-    /// Chance that it is this one, if it is one of them, 0 to 1.
+    /// Chance that it is this one, 0 to 1.
     pub weight: f64,
     /// True for the first one, and for those that the tool's symmetry makes of it.
     pub alike: bool,
@@ -76,7 +76,6 @@ impl Problem<'_> {
             told.map(|(_, (at, cost))| (at.to_pose(centroid), chance(*cost))).collect();
         // Its own pose, which a state rounds.
         told[0].0 = report.grasp_from_object;
-        let sum: f64 = told.iter().map(|(_, chance)| chance).sum();
         shared(told.into_iter().map(|(pose, chance)| (pose, chance / sum)).collect(), symmetry, report.range)
     }
 

@@ -20,6 +20,8 @@ const CAP_M: f32 = 3e-3;
 const PLACES: usize = 1200;
 /// Poses that go on to each band, coarse to fine.
 const KEEP: [usize; LAST] = [24, 12, 8];
+/// How much dearer than the cheapest they may be after each band, as a share.
+const WORTH: [f64; LAST] = [0.6, 0.4, 0.25];
 
 /// An image's cells with depth: the first that they are compared with, and the height.
 type Cells = Vec<(usize, f32)>;
@@ -88,7 +90,7 @@ impl Problem<'_> {
     /// So many ends of the scouts that start all around, the cheapest first.
     pub(super) fn anywhere(&self, descents: &mut Descents<'_, '_>, count: usize) -> Vec<(State, Progress)> {
         let mut runs: Vec<(State, Progress)> = self.coarse().into_iter().map(|at| (at, Progress::new(at))).collect();
-        for stage in 0..LAST {
+        for (stage, worth) in WORTH.into_iter().enumerate() {
             let mut ends: Vec<(State, Progress)> = Vec::with_capacity(runs.len());
             for (start, mut at) in runs {
                 descents.descend(ends.len(), &mut at, stage, SCOUTS_WEIGHT);
@@ -101,6 +103,8 @@ impl Problem<'_> {
             ends.retain(|(_, at)| self.config.allows(at.state.to_pose(self.centroid())));
             ends.sort_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
             ends.truncate(KEEP.get(stage + 1).copied().unwrap_or(count));
+            let dearest = ends.first().map_or(0.0, |(_, best)| best.cost * (1.0 + worth));
+            ends.retain(|(_, at)| at.cost <= dearest);
             runs = ends;
         }
         runs

@@ -52,7 +52,7 @@ const AGREES: f64 = 0.1;
 const CLOSE: f64 = 0.15;
 /// Share of the membrane's relief that an answer from the prior must explain, or scouts start all around: of a membrane that
 /// hangs from the tool, and of one that reaches the middle plane.
-const STANDS: [f64; 2] = [0.3, 0.4];
+const STANDS: [f64; 2] = [0.33, 0.4];
 /// Share of its cost that another pose must be ahead of it.
 const AHEAD: f64 = 0.03;
 /// Most steps in each band.
@@ -66,8 +66,12 @@ pub(super) const STEPS_M: [f64; 4] = [1e-4, 5e-5, 5e-5, 1e-5];
 
 /// Ends of scouts from all around that are refined.
 const ENDS: usize = 4;
+/// Places of the membranes that they compare in the coarsest band: more than those from the prior, which start nearer.
+const PLACES_AROUND: usize = 200;
+/// Most templates that an end of theirs goes through: where it ends another one may be nearer.
+const SETTLED: usize = 3;
 /// Most steps of scouts that start all around, and of the last descent.
-const STEPS_AROUND: [usize; LAST + 1] = [6, 8, 12, STEPS];
+const STEPS_AROUND: [usize; LAST + 1] = [6, 8, 12, 8];
 
 /// A finger's image and its template.
 struct Finger {
@@ -193,7 +197,8 @@ impl<'a> Problem<'a> {
     ) -> Result<Option<Self>, AlignError> {
         let finite = tool.mesh.vertices.iter().filter(|v| v.is_finite());
         let tops = finite.fold([0f64; 2], |[low, high], v| [low.max(-v.x), high.max(v.x)]);
-        let images: Vec<Image> = scene.images().iter().filter_map(|image| Image::new(image, tops)).collect();
+        let images: Vec<Image> =
+            scene.images().iter().filter_map(|image| Image::new(image, tops, config.is_wider())).collect();
         let area: f64 = images.iter().map(Image::area_m2).sum();
         if area < MIN_AREA_M2 {
             return Ok(None);
@@ -331,6 +336,7 @@ impl<'a> Problem<'a> {
         let mut runs: Vec<Progress> = Vec::new();
         let mut rung = if own { Rung::Single } else { Rung::Fixed };
         let mut more = MORE.iter().filter(|_| own);
+        let mut settled = false;
         let order = loop {
             for start in &starts[runs.len()..] {
                 let mut at = Progress::new(State::from_pose(*start, self.centroid));
@@ -351,9 +357,11 @@ impl<'a> Problem<'a> {
                 runs.iter().partition(|at| alike(&at.state, &best.state));
             let rival = apart.iter().any(|at| at.cost < best.cost * (1.0 + CLOSE));
             if self.allowed(best) && met.len() > 1 && !rival {
+                settled = true;
                 break order;
             }
-            let Some(shares) = more.next() else { break order };
+            // What the middle of the prior does not settle, scouts all around do.
+            let Some(shares) = more.next().filter(|_| !around) else { break order };
             rung = Rung::Several;
             let theta_rad = Prior::default().theta_rad;
             starts.extend(shares.map(|share| PlanarPose { theta_rad: share * theta_rad, ..PlanarPose::default() }));
@@ -361,7 +369,9 @@ impl<'a> Problem<'a> {
         let best = runs[order[0]];
         let (explained, noise_m) = descents.told(best.state);
         let mask_weight = self.mask_weight(noise_m, best.state);
-        let winner = self.refine(&mut runs, &order, &mut descents, mask_weight);
+        let stands = if self.predicted { PREDICTED_EXPLAINED } else { STANDS[usize::from(self.free.reaches)] };
+        let look_around = around && own && !(settled && explained >= stands);
+        let winner = if look_around { order[0] } else { self.refine(&mut runs, &order, &mut descents, mask_weight) };
         let fit = JointFit {
             basis: if self.mask.is_some() { Basis::Both } else { Basis::Membrane },
             noise_m,
@@ -372,8 +382,7 @@ impl<'a> Problem<'a> {
         let points = descents.patches[LAST].iter().map(|(_, patch)| patch.len()).sum();
         let mut answer =
             Answer { starts, runs, winner, rung, fit, lookups: 0, trace: Vec::new(), points, ends: Vec::new() };
-        let stands = if self.predicted { PREDICTED_EXPLAINED } else { STANDS[usize::from(self.free.reaches)] };
-        if around && own && explained < stands {
+        if look_around {
             self.look_around(&mut answer, &mut descents);
         }
         Answer { lookups: descents.lookups, trace: descents.trace, ..answer }
@@ -385,32 +394,43 @@ impl<'a> Problem<'a> {
         (answer.rung == Rung::Around).then_some(end).into_iter().collect()
     }
 
-    /// Scouts all around; a pose that they find is the answer if it is cheaper by a margin.
+    /// Scouts all around; a pose that they find is the answer if it is cheaper by a margin than the one at hand.
     fn look_around(&self, answer: &mut Answer, descents: &mut Descents<'_, '_>) {
         descents.around = true;
-        let ends = self.anywhere(descents, ENDS);
-        let Some((_, best)) = ends.first() else { return };
-        let (explained, noise_m) = descents.told(best.state);
-        let weight = self.mask_weight(noise_m, best.state);
-        let refined: Vec<(State, Progress)> = ends
-            .into_iter()
-            .map(|(start, mut at)| {
-                descents.descend(answer.runs.len(), &mut at, LAST, weight);
-                (start, at)
-            })
-            .filter(|(_, at)| self.config.allows(at.state.to_pose(self.centroid)))
-            .collect();
-        let Some((start, best)) = refined.iter().min_by(|a, b| a.1.cost.total_cmp(&b.1.cost)) else { return };
-        let mut first = Progress::new(answer.end());
-        descents.descend(answer.winner, &mut first, LAST, weight);
-        answer.ends = refined.iter().map(|(_, at)| *at).chain([first]).collect();
+        descents.patches[0] = self.patches_of(0, PLACES_AROUND);
+        let mut ends = self.anywhere(descents, ENDS);
+        let at_hand = answer.end();
+        let likeliest = ends.first().map_or(at_hand, |(_, best)| best.state);
+        let weight = self.mask_weight(descents.told(likeliest).1, likeliest);
+        ends.push((at_hand, Progress::new(at_hand)));
+        let run = answer.runs.len();
+        for (_, at) in &mut ends {
+            self.settle(descents, run, at, weight);
+        }
+        let (_, first) = ends[ends.len() - 1];
         let margin = if self.allowed(&first) { AHEAD } else { 0.0 };
-        if best.cost < first.cost * (1.0 - margin) {
-            answer.winner = answer.runs.len();
-            answer.rung = Rung::Around;
-            answer.fit = JointFit { noise_m, mask_weight: weight, explained, ..answer.fit };
-            answer.runs.push(*best);
-            answer.starts.push(start.to_pose(self.centroid));
+        ends.retain(|(_, at)| self.config.allows(at.state.to_pose(self.centroid)));
+        ends.sort_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
+        answer.ends = ends.iter().map(|(_, at)| *at).collect();
+        let found = ends.first().filter(|(_, best)| best.cost < first.cost * (1.0 - margin));
+        let (start, mut best) = found.copied().unwrap_or((at_hand, first));
+        self.settle(descents, run, &mut best, weight);
+        let (explained, noise_m) = descents.told(best.state);
+        answer.fit = JointFit { noise_m, mask_weight: weight, explained, ..answer.fit };
+        answer.rung = if self.allowed(&best) { answer.rung } else { Rung::Around };
+        answer.winner = run;
+        answer.runs.push(best);
+        answer.starts.push(start.to_pose(self.centroid));
+    }
+
+    /// The last descent, again with the template of where it ended until that is the same.
+    fn settle(&self, descents: &mut Descents<'_, '_>, run: usize, at: &mut Progress, weight: f64) {
+        for _ in 0..SETTLED {
+            let grasp = self.grasp(at.state, true);
+            descents.descend(run, at, LAST, weight);
+            if self.grasp(at.state, true) == grasp {
+                break;
+            }
         }
     }
 

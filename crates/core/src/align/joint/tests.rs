@@ -8,7 +8,7 @@ use super::template::template;
 use super::*;
 use crate::align::batch::{Cloud, State};
 use crate::align::search::Cost;
-use crate::align::{Contacts, Evidence, PadImage, Prior, Uncertainty};
+use crate::align::{Contacts, Evidence, PadImage, Prior, Rung, Uncertainty};
 use crate::catalog::tools;
 use crate::cloud::lift;
 use crate::grid::{DepthMap, Mask};
@@ -281,7 +281,10 @@ fn a_place_open_along_the_tool_is_no_fault_where_it_is_let_down_along_itself() {
     let [held, let_down] = graded(3e-3, 1e-4);
     assert_eq!((held.grade, let_down.grade), (Grade::Check, Grade::Good));
     // Its sentence is its own: what is no fault is no reason.
-    assert!(held.why.contains("not determine the position") && let_down.why.contains("lies on the tool"), "{held:?} {let_down:?}");
+    assert!(
+        held.why.contains("not determine the position") && let_down.why.contains("lies on the tool"),
+        "{held:?} {let_down:?}"
+    );
     assert_eq!(graded(1e-4, 3e-3).map(|verdict| verdict.grade), [Grade::Check; 2]);
     assert_eq!(graded(1e-4, 1e-4).map(|verdict| verdict.grade), [Grade::Good; 2]);
 }
