@@ -228,8 +228,8 @@ pub(super) fn depth_tiffs() -> Vec<Seed> {
         good("an imprint", tiff(175, 140, 1, &zeros)),
         bad("another size", tiff(3, 2, 1, &zeros[..24]), "3 x 2 values"),
         bad("too large", tiff(100_000, 100_000, 1, &zeros[..24]), "100000 x 100000"),
-        bad("compressed otherwise", tiff(175, 140, 9, &zeros), "no TIFF that can be read"),
-        bad("cut off", tiff(175, 140, 1, &zeros[..24]), "no TIFF that can be read"),
+        bad("compressed otherwise", tiff(175, 140, 9, &zeros), "not a readable TIFF"),
+        bad("cut off", tiff(175, 140, 1, &zeros[..24]), "not a readable TIFF"),
     ]
 }
 

@@ -206,7 +206,7 @@ fn stl_seeds() -> Vec<Seed> {
 fn unit_seeds() -> Vec<Seed> {
     let mut seeds: Vec<Seed> = ["m", "auto", "1", "m\n"].map(|unit| good("a unit", text(unit))).into();
     seeds.push(bad("another unit", text("0.001"), "not a tool"));
-    seeds.push(bad("no unit", text("furlong"), "no unit"));
+    seeds.push(bad("no unit", text("furlong"), "unknown unit"));
     seeds.push(bad("a long text", text(&"m".repeat(10_000)), "at most"));
     seeds
 }
