@@ -321,7 +321,7 @@ def test_masks_are_drawn_by_gestures_and_exported(written, tmp_path):
         (lambda: t2t.label(pair, draw=[square | {"points": [[900, 900], [901, 901]]}]), "touches no pixel"),
         (lambda: t2t.label(pair, begin="guess"), "cad_truth"),
         (lambda: t2t.label(pair, clean=["polish"]), "fill_holes"),
-        (lambda: t2t.label(pair, finger="thumb"), "right, left, both"),
+        (lambda: t2t.label(pair, finger="thumb"), "right, left or both"),
         (lambda: t2t.label(t2t.simulate("pattern_36"), note="x"), "simulate"),
         (lambda: t2t.export_masks(written, tmp_path / "none", pairs="some"), "begun"),
     ]:
