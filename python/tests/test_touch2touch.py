@@ -147,7 +147,7 @@ def test_what_is_not_known_is_refused_in_words(pair):
         (lambda: t2t.Recipe(mask="best"), "threshold"),
         (lambda: t2t.Recipe(colour="red"), "no choice colour"),
         (lambda: t2t.Recipe("predicted", bundle="/nowhere"), "nowhere"),
-        (lambda: t2t.estimate(pair, stage="end"), "no stage"),
+        (lambda: t2t.estimate(pair, stage="end"), "there is no"),
         (lambda: t2t.simulate("hammer"), "pattern_36"),
         (lambda: t2t.simulate("pattern_36", float("nan")), "finite"),
         (lambda: t2t.ssim(np.zeros((9, 9), np.float32), np.zeros((9, 8), np.float32)), "9x9"),
