@@ -55,8 +55,7 @@ pub fn run(open: Option<PathBuf>, reset: bool) -> Result<(), String> {
         setup.device_descriptor = Arc::new(Gpu::device_descriptor);
     }
     let services = Services::of_user();
-    // What is wrong with the file is said when the studio reads it.
-    let last = (!reset).then(|| services.load_settings().0.last.window).flatten();
+    let last = (!reset).then(|| services.window_place()).flatten();
     native.viewport = window::place::restored(native.viewport, last);
     let mut options = Options::new(Arc::new(services), open);
     options.reset = reset;

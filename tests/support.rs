@@ -131,7 +131,7 @@ pub(crate) fn json(output: &Output) -> Value {
     serde_json::from_str(&text).unwrap_or_else(|err| panic!("{err}: {text}"))
 }
 
-/// What a verb says on standard error.
+/// Standard error of a verb.
 pub(crate) fn error_text(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }

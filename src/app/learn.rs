@@ -124,7 +124,7 @@ fn start(title: impl Into<String>, what: &str) -> Start {
     Start { what: what.to_owned(), ..Start::new(TaskKind::Learn, title) }
 }
 
-/// What was learned.
+/// Result of a training or a fit.
 pub enum Learned {
     /// The fit, and its bundle where one was written.
     Generator(Arc<Adapted>, Option<BundleInfo>),

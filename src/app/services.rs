@@ -6,7 +6,7 @@ use std::time::Duration;
 use serde_json::Value;
 
 use super::source::Place;
-use super::state::settings::{SETTINGS_VERSION, Settings};
+use super::state::settings::{SETTINGS_VERSION, Settings, WindowPlace};
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::infer::store::{self, Store};
 use touch2touch_pipeline::io::statistics::ShiftStatistics;
@@ -88,6 +88,13 @@ impl Services {
         let (settings, problem) = self.read_settings();
         self.keep_at_most(&settings);
         (settings, problem)
+    }
+
+    /// Where the window was when it was closed. A file that cannot be read stays where it is: the studio reads it next, sets it
+    /// aside and says so.
+    pub(crate) fn window_place(&self) -> Option<WindowPlace> {
+        let file = self.config_folder.as_ref()?.join(SETTINGS_FILE);
+        parse_settings(&files::read(&file, files::SMALL).ok()?).ok()?.0.validated().last.window
     }
 
     /// Writes the settings.
@@ -208,6 +215,8 @@ mod tests {
         let file = folder.path().join("new").join(SETTINGS_FILE);
         for bad in ["", "[1, 2", r#"{"version": 999}"#, r#"{"theme": "light"}"#] {
             std::fs::write(&file, bad).unwrap();
+            // The window asks first, and leaves it to the studio to say what is wrong.
+            assert!(services.window_place().is_none() && file.exists());
             let (settings, problem) = services.load_settings();
             assert_eq!(settings, Settings::default(), "{bad}");
             assert!(problem.unwrap().hint.unwrap().contains(BAD_SETTINGS_FILE));
@@ -217,6 +226,11 @@ mod tests {
         // Numbers that cannot be worked with are brought into range; unknown and missing keys are no harm.
         std::fs::write(&file, r#"{"version": 1, "ui_zoom": 1e9, "new_key": 3}"#).unwrap();
         assert_eq!(services.load_settings().0.ui_zoom, 4.0);
+        for (size, there) in [("[900, 700]", true), ("[0, 700]", false), ("[900, 1e30]", false)] {
+            let last = format!(r#"{{"window": {{"position": [-3, 4], "size": {size}, "maximized": true}}}}"#);
+            std::fs::write(&file, format!(r#"{{"version": 1, "last": {last}}}"#)).unwrap();
+            assert_eq!(services.window_place().is_some(), there, "{size}");
+        }
         // Keys that cannot be used cost nothing else, and are said.
         // A field that cannot be read falls back alone, and the file as it was is kept.
         let one = r#"{"version": 1, "theme": "plaid", "ui_zoom": 2.0, "recent": ["demo", 7, {"path": "/data/x"}],

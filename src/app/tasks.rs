@@ -50,7 +50,7 @@ pub(super) fn step(state: &mut State, command: TasksCommand, effects: &mut Vec<E
     }
 }
 
-/// What is said of a job that a person starts, and where it runs.
+/// Name of a job that a person starts, and where it runs.
 pub(super) struct Start {
     pub kind: TaskKind,
     /// The name on screen.

@@ -129,7 +129,7 @@ struct Listed {
     right: bool,
 }
 
-/// What one range makes of a grasp.
+/// Result of one range for a grasp.
 #[derive(Clone, Debug, Serialize)]
 struct Found {
     /// Up to the tool's symmetry; `null` without a pose.

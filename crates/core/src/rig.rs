@@ -13,7 +13,6 @@ use std::sync::{Arc, LazyLock};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::grid::{Grid, Mask};
 use super::sensor::Intrinsics;
 pub use per_pad::{PadId, PerPad};
 
@@ -239,18 +238,6 @@ impl Rig {
         let turn = |sensor: Option<&Sensor>| sensor.map(|sensor| sensor.rotation_deg);
         turn(self.color()).zip(turn(self.depth())).is_some_and(|(color, depth)| color != depth)
     }
-
-    /// Mask of the pixels of a depth picture of `size` (`[width, height]`, raw orientation; other sizes than the
-    /// sensor's stand for the same area) that the pad's color sensor sees; `None` where the rig does not say.
-    pub fn seen_mask(&self, pad: PadId, size: [usize; 2]) -> Option<Mask> {
-        let sensor = self.depth()?;
-        let [cx, cy, width, height] = self.color_window(pad)?.rectangle();
-        let full = |index: usize, from: usize, to: usize| (index as f64 + 0.5) * to as f64 / from.max(1) as f64 - 0.5;
-        Some(Grid::from_fn(size[0], size[1], |x, y| {
-            let (x, y) = (full(x, size[0], sensor.width), full(y, size[1], sensor.height));
-            (x - cx).abs() <= width / 2.0 && (y - cy).abs() <= height / 2.0
-        }))
-    }
 }
 
 #[cfg(test)]
@@ -270,20 +257,5 @@ mod tests {
         }
         assert_eq!(crop.project(&k, DVec3::new(0.0, 0.0, 0.0)), None);
         assert_eq!(crop.project(&k, DVec3::new(0.0, 0.0, f64::NAN)), None);
-    }
-
-    #[test]
-    fn the_footprint_is_where_the_paper_draws_it() {
-        let rig = Rig::lab();
-        for finger in rig.pads() {
-            let mask = rig.seen_mask(finger, [lab::BUBBLE.width, lab::BUBBLE.height]).unwrap();
-            let [_, _, w, h] = rig.color_window(finger).unwrap().rectangle();
-            let count = mask.as_slice().iter().filter(|s| **s).count() as f64;
-            assert!((count / (w * h) - 1.0).abs() < 0.05, "{count}");
-            // The same part of an image of another size.
-            let small = rig.seen_mask(finger, [128, 128]).unwrap();
-            let share = small.as_slice().iter().filter(|s| **s).count() as f64 / (128.0 * 128.0);
-            assert!((share - w * h / (175.0 * 140.0)).abs() < 0.01, "{share}");
-        }
     }
 }

@@ -1,4 +1,4 @@
-//! What is read of a pair: its tensors, its small picture, its labels, the CAD model of its tool.
+//! The parts that are read of a pair: its tensors, its small picture, its labels, the CAD model of its tool.
 
 use std::sync::Arc;
 

@@ -122,19 +122,27 @@ pub struct Last {
     pub maximized: String,
     /// The order of the list.
     pub sort: Sort,
-    /// Where the window was, where the system says it.
+    /// Place of the window, where the system says it.
     pub window: Option<WindowPlace>,
 }
 
 /// Place of the window on the desktop, points.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct WindowPlace {
-    /// Its upper left corner, with the frame.
+    /// Upper left corner, with the frame.
     pub position: [f32; 2],
-    /// Its size, without the frame.
+    /// Size, without the frame.
     pub size: [f32; 2],
     /// True where it filled the screen; place and size are those from before then.
     pub maximized: bool,
+}
+
+impl WindowPlace {
+    /// True for a window that a screen can have.
+    fn is_usable(self) -> bool {
+        self.size.iter().all(|side| (1.0..=65535.0).contains(side))
+            && self.position.iter().all(|at| at.abs() <= 65535.0)
+    }
 }
 
 impl Settings {
@@ -159,6 +167,7 @@ impl Settings {
         self.cache_mib = self.cache_mib.min(MAX_CACHE_MIB);
         self.person = self.person.chars().filter(|c| !c.is_control()).take(80).collect();
         self.recent.truncate(MAX_RECENT);
+        self.last.window = self.last.window.filter(|window| window.is_usable());
         self
     }
 

@@ -273,7 +273,7 @@ fn list(cx: &Cx<'_>, ui: &mut Ui, compared: &CompareChoice, letter: Letter, widt
     chosen.map(|(value, ..)| value.clone())
 }
 
-/// What can stand on a side: the measurement, the prediction on screen, that of each other model.
+/// Choices for a side: the measurement, the prediction on screen, that of each other model.
 fn rows(cx: &Cx<'_>) -> Vec<(Subject, String, &'static str)> {
     let rig = cx.state.rig();
     let depth = |b: &&BundleInfo| b.generator.as_ref().is_some_and(|g| g.sensors.output.kind == SensorKind::Depth);

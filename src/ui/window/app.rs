@@ -95,7 +95,7 @@ pub struct StudioApp {
     applied_theme: Option<Theme>,
     applied_zoom: f32,
     folder: Option<PathBuf>,
-    /// Where it is on the desktop.
+    /// Place on the desktop.
     place: Option<WindowPlace>,
     /// True where the window may close: everything is saved, or is not to be.
     leaving: bool,

@@ -1,10 +1,10 @@
-//! Where the window is on the desktop: kept from one start to the next.
+//! Place of the window on the desktop, kept from one start to the next.
 
 use eframe::egui::{Context, ViewportBuilder};
 
 use crate::app::settings::WindowPlace;
 
-/// Where the window is now; `before` says where it was when it filled the screen, or where the system tells nothing.
+/// The place now; `before` says where it was when it filled the screen, or where the system tells nothing.
 pub(super) fn of(ctx: &Context, before: Option<WindowPlace>) -> Option<WindowPlace> {
     ctx.input(|i| {
         let viewport = i.viewport();

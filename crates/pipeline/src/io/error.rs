@@ -11,15 +11,15 @@ use touch2touch_core::dataset::Problem;
 pub struct FileError {
     /// The file or folder; empty where it is none.
     pub file: PathBuf,
-    /// What is wrong.
+    /// The fault.
     pub what: String,
     /// Advice for the user.
     pub hint: &'static str,
-    /// What the caller can make of it.
+    /// The kind, as far as a caller acts on it.
     pub kind: FileErrorKind,
 }
 
-/// What the caller of a reader or writer can make of an error.
+/// Kind of an error, as far as the caller of a reader or writer acts on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum FileErrorKind {
     /// Nothing; of a file that is still being written, it may be over soon.

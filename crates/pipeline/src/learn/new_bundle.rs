@@ -22,7 +22,7 @@ fn unwritable(what: &str, file: &Path, err: std::io::Error) -> TaskError {
     TaskError::new(what, format!("cannot be written: {err} ({})", file.display()))
 }
 
-/// Where a bundle goes, with the folders above it made and swept.
+/// Place of a new bundle, with the folders above it made and swept.
 fn place(what: &str, out: &Path) -> Result<PathBuf, TaskError> {
     let place = std::path::absolute(out).map_err(|err| unwritable(what, out, err))?;
     let parent = place.parent().unwrap_or(&place);
