@@ -55,7 +55,7 @@ pub fn run(open: Option<PathBuf>, reset: bool) -> Result<(), String> {
         setup.device_descriptor = Arc::new(Gpu::device_descriptor);
     }
     let services = Services::of_user();
-    let last = (!reset).then(|| services.window_place()).flatten();
+    let last = (!reset).then(|| services.peek_settings()).flatten().and_then(|settings| settings.last.window);
     native.viewport = window::place::restored(native.viewport, last);
     let mut options = Options::new(Arc::new(services), open);
     options.reset = reset;

@@ -10,25 +10,22 @@ use super::command::{
 };
 use super::keys::ImprintSource;
 use super::learn::{self, Network};
-use super::pane::Workspace;
 use super::settings::prefer;
 use super::state::export::Output;
 use super::state::inspect::Inspected;
 use super::state::labels::Review;
 use super::state::library::Place;
-use super::state::settings::{ColorRange, MaskTool};
+use super::state::settings::MaskTool;
 use super::state::tasks::TaskKind;
 use super::state::view::Purpose;
 use super::state::workbench::{Layer, SceneTool};
 use super::state::{Absent, State};
+use super::workbench::in_hand;
 use super::{export, results};
 use touch2touch_core::label::{CleanKind, Paint};
-use touch2touch_core::manual::PoseAxis;
 
 /// Factor by which a key press changes the brush.
 const BRUSH_STEP: f32 = 1.25;
-/// By how much a key press changes the opacity.
-const OPACITY_STEP: f32 = 0.1;
 
 macro_rules! commands {
     ($( $name:ident, $group:ident, $label:literal, $tooltip:literal, [$($shortcut:tt)*], $state:pat => $does:expr; )*) => {
@@ -169,19 +166,10 @@ fn can_score_all(state: &State) -> bool {
         && state.tasks.of_kind(TaskKind::Evaluate).is_none()
 }
 
-/// True where the pose tool is in hand and there is a tool to be moved.
-fn in_hand(state: &State) -> bool {
-    state.workbench.tool == SceneTool::Pose && results::tool(state).ready().is_some()
-}
-
 /// Takes a tool of the 3D panes, or puts it away.
 fn toggle(state: &State, tool: SceneTool) -> Option<Command> {
     let next = if state.workbench.tool == tool { SceneTool::Look } else { tool };
     when(state.entry().is_some(), WorkbenchCommand::SetTool(next))
-}
-
-fn nudge(state: &State, axis: PoseAxis, steps: f64) -> Option<Command> {
-    when(in_hand(state), WorkbenchCommand::Nudge(axis, steps * axis.step()))
 }
 
 /// The command of Escape in the 3D panes: it gives up the pose in hand, then the tool, then the point read.

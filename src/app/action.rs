@@ -7,7 +7,7 @@ mod shortcut;
 use strum::{EnumIter, EnumString, IntoEnumIterator, IntoStaticStr};
 
 pub use shortcut::Shortcut;
-use shortcut::{alt, alt_shift, ctrl, ctrl_shift, plain, shift};
+use shortcut::{alt, ctrl, ctrl_shift, plain, shift};
 
 with_texts! {
     /// The part of the shortcut sheet an action stands in.
@@ -67,10 +67,6 @@ macro_rules! actions {
             state => listed(state, LibraryCommand::Step(-1));
         NextPair, Navigate, "Next pair", "Shows the next pair of the list", [plain("D"), plain("PgDn")],
             state => listed(state, LibraryCommand::Step(1));
-        TenBack, Navigate, "10 back", "Moves 10 pairs back in the list", [shift("A")],
-            state => listed(state, LibraryCommand::Step(-10));
-        TenForward, Navigate, "10 forward", "Moves 10 pairs forward in the list", [shift("D")],
-            state => listed(state, LibraryCommand::Step(10));
         FirstPair, Navigate, "First pair", "Shows the first pair of the list", [plain("Home")],
             state => listed(state, LibraryCommand::First);
         LastPair, Navigate, "Last pair", "Shows the last pair of the list", [plain("End")],
@@ -90,12 +86,10 @@ macro_rules! actions {
             state => when(results::can_generate(state).is_ok(), PredictCommand::Generate);
         GenerateNewSeed, Generate, "Generate with a new seed", "Draws a new seed and generates", [ctrl_shift("G")],
             state => when(results::can_generate(state).is_ok(), PredictCommand::GenerateNewSeed);
-        LockSeed, Generate, "Lock the seed", "Keeps the seed, or draws a new one each time you generate", [ctrl("L")],
-            _ => does(prefer(|s| s.generate.seed_locked ^= true));
         FitPairs, Generate, "Fit to my pairs", "Fits the generator to the open pairs, and says what it is worth on pairs that were left out", [],
             state => when(learn::can_start(state, Network::Generator), LearnCommand::Start(Network::Generator));
-        UseFit, Generate, "Use the fitted model", "Predicts with the model that was fitted to these pairs", [],
-            state => can_use(state, Network::Generator);
+        UseModel, Generate, "Use the new model", "Predicts or makes automatic masks with the model that was fitted or trained on these pairs", [],
+            state => can_use(state, state.learn.shown);
         PredictAll, Generate, "Predict all", "Predicts and scores every pair of the open data set with the chosen generators; what was scored before is not computed again", [],
             state => when(can_score_all(state), EvaluateCommand::Start);
         ExportTable, Generate, "Export the results table…", "Writes the results table as CSV and JSON", [],
@@ -125,8 +119,6 @@ macro_rules! actions {
             _ => does(prefer(|s| s.mask.layers = s.mask.layers.other()));
         PaintIgnore, Mask, "Paint ignored pixels", "Tools mark pixels to ignore, neither contact nor free; off: they paint contact", [shift("B")],
             _ => does(paint(Paint::Ignore));
-        LastTool, Mask, "Last tool", "Goes back to the previous tool", [plain("Q")],
-            _ => does(prefer(|s| s.mask.tool = s.mask.last_tool));
         BrushSmaller, Mask, "Smaller brush", "Makes the brush smaller", [plain("[")],
             _ => does(prefer(|s| s.mask.radius_px /= BRUSH_STEP));
         BrushLarger, Mask, "Larger brush", "Makes the brush larger", [plain("]")],
@@ -145,8 +137,6 @@ macro_rules! actions {
             state => editable(state, LabelsCommand::AdoptAutomatic);
         Propose, Mask, "Propose a mask", "Shows a suggested mask over the current one, to accept as a whole or by brush; nothing changes until then", [plain("G")],
             state => of_pair(state, ViewCommand::Propose(!state.selection.proposing));
-        LetThrough, Mask, "Let the proposal through", "Tools accept the suggestion where they paint; off: they paint contact", [shift("L")],
-            state => does(paint(Paint::LetThrough)).filter(|_| state.settings.mask.paint == Paint::LetThrough || results::proposes(state));
         ResetMask, Mask, "Back to the automatic mask", "Removes what you drew", [shift("T")],
             state => editable(state, LabelsCommand::ResetMask).filter(|_| is_corrected(state));
         Undo, Mask, "Undo", "Undoes the last change to what is on screen, or the last polygon corner", [ctrl("Z")],
@@ -157,16 +147,10 @@ macro_rules! actions {
             _ => does(LearnCommand::Show(Network::Masks));
         StartTraining, Mask, "Start training", "Trains the mask model on the masks of pairs marked done; the new model makes the automatic masks when it is ready", [],
             state => when(learn::can_start(state, Network::Masks), LearnCommand::Start(Network::Masks));
-        UseTrained, Mask, "Use the trained mask model", "Makes automatic masks with the model that was trained on these pairs", [],
-            state => can_use(state, Network::Masks);
         MaskVisible, Mask, "Show the mask", "Shows or hides the mask over the images", [plain("S")],
             _ => does(prefer(|s| s.mask_visible ^= true));
         MaskOutline, Mask, "Mask as outline", "Shows only the outline of the mask", [shift("S")],
             _ => does(prefer(|s| s.mask_outline ^= true));
-        MaskFainter, Mask, "Mask fainter", "Makes the mask more transparent", [plain("-")],
-            _ => does(prefer(|s| s.mask_opacity -= OPACITY_STEP));
-        MaskStronger, Mask, "Mask stronger", "Makes the mask less transparent", [plain("=")],
-            _ => does(prefer(|s| s.mask_opacity += OPACITY_STEP));
         DoneAndNext, Mask, "Done and next", "Marks the pair done, with the masks on screen, and goes to the next unfinished one", [ctrl("Enter")],
             state => editable(state, LibraryCommand::DoneAndNext);
         Flag, Mask, "Flag", "Marks the pair as doubtful", [plain("!")],
@@ -184,18 +168,6 @@ macro_rules! actions {
             state => accept(state, ImprintSource::Predicted);
         PoseTool, Pose, "Pose tool", "Moves the tool by hand in the 3D panes: arrow keys, or the handles", [plain("Z")],
             state => toggle(state, SceneTool::Pose);
-        NudgeLeft, Pose, "Nudge -y", "Moves the tool by 0.1 mm along -y; with Shift 1 mm, with Ctrl 0.01 mm", [plain("Left"), shift("Left"), ctrl("Left")],
-            state => nudge(state, PoseAxis::Y, -1.0);
-        NudgeRight, Pose, "Nudge +y", "Moves the tool by 0.1 mm along +y; with Shift 1 mm, with Ctrl 0.01 mm", [plain("Right"), shift("Right"), ctrl("Right")],
-            state => nudge(state, PoseAxis::Y, 1.0);
-        NudgeUp, Pose, "Nudge -z", "Moves the tool by 0.1 mm along -z, to the wrist; with Shift 1 mm, with Ctrl 0.01 mm", [plain("Up"), shift("Up"), ctrl("Up")],
-            state => nudge(state, PoseAxis::Z, -1.0);
-        NudgeDown, Pose, "Nudge +z", "Moves the tool by 0.1 mm along +z; with Shift 1 mm, with Ctrl 0.01 mm", [plain("Down"), shift("Down"), ctrl("Down")],
-            state => nudge(state, PoseAxis::Z, 1.0);
-        TurnLeft, Pose, "Turn -", "Turns the tool by -0.5° about x; with Shift 5°, with Ctrl 0.05°", [alt("Left"), alt_shift("Left"), ctrl_shift("Left")],
-            state => nudge(state, PoseAxis::Theta, -1.0);
-        TurnRight, Pose, "Turn +", "Turns the tool by 0.5° about x; with Shift 5°, with Ctrl 0.05°", [alt("Right"), alt_shift("Right"), ctrl_shift("Right")],
-            state => nudge(state, PoseAxis::Theta, 1.0);
         IcpFromHere, Pose, "Register from here", "Registers again, starting from the pose set by hand", [shift("Z")],
             state => when(in_hand(state), WorkbenchCommand::StartIcp);
         Accept, Pose, "Accept", "Closes the polygon, accepts the suggested mask, or saves the pose set by hand", [plain("Enter")],
@@ -206,10 +178,6 @@ macro_rules! actions {
             state => inspect(state, |s| s.at > 0, InspectCommand::By(-1));
         StepForward, Pose, "Next step", "Next step of the registration", [plain(".")],
             state => inspect(state, |s| !s.is_last(), InspectCommand::By(1));
-        FirstStep, Pose, "First step", "Where the registration started", [shift(",")],
-            state => inspect(state, |s| s.at > 0, InspectCommand::BEGIN);
-        LastStep, Pose, "Last step", "Where the registration ended", [shift(".")],
-            state => inspect(state, |s| !s.is_last(), InspectCommand::END);
         PlaySteps, Pose, "Play the steps", "Plays the registration, or pauses; with the pointer in the steps or a 3D view", [plain("Space")],
             state => inspect(state, |s| s.inspection.num_steps(s.run) > 1, InspectCommand::Play(!state.inspect.playing));
         OwnStarts, Pose, "All starts", "Back from a single start to all that the registration tries", [],
@@ -219,8 +187,6 @@ macro_rules! actions {
             _ => does(prefer(|s| s.range.locked ^= true));
         RangeOnce, View, "Fit the color range", "Fits the colors to what is shown", [plain("C")],
             state => of_pair(state, SettingsCommand::RangeFromShown);
-        ResetRange, View, "Reset the color range", "Sets the color range to 0 to 18 mm", [shift("C")],
-            _ => does(prefer(|s| s.range = ColorRange::default()));
         Fit, View, "Fit", "Fits images and 3D views to their panes", [plain("0")],
             _ => ui(UiRequest::Fit);
         CameraLeft, View, "View from the left", "Looks along the closing axis from the left finger", [ctrl("1")],
@@ -229,40 +195,20 @@ macro_rules! actions {
             _ => ui(UiRequest::Camera(CameraPreset::Right));
         CameraFront, View, "View from the front", "Looks across the closing axis", [ctrl("3")],
             _ => ui(UiRequest::Camera(CameraPreset::Front));
-        CameraBack, View, "View from the back", "Looks across the closing axis from the other side", [ctrl("5")],
-            _ => ui(UiRequest::Camera(CameraPreset::Back));
-        CameraBottom, View, "View from below", "Looks along the tool from its tip", [ctrl("6")],
-            _ => ui(UiRequest::Camera(CameraPreset::Bottom));
         CameraOblique, View, "Oblique view", "The view at the start: from above a corner", [ctrl("7")],
             _ => ui(UiRequest::Camera(CameraPreset::Oblique));
         CameraTop, View, "View from the top", "Looks along the tool", [ctrl("4")],
             _ => ui(UiRequest::Camera(CameraPreset::Top));
         Distances, View, "Distance to the CAD", "Colors CAD model and contact points in 3D by their distance, in mm", [plain("V")],
             state => distances(state);
-        NextLayer, View, "Next coloring", "Cycles through the colorings of the contact points: plain, residual, pixels used, distance, pull lines", [shift("V")],
-            state => does(WorkbenchCommand::SetLayer(next_of(&state.workbench.layer)));
         BothClouds, View, "Both clouds", "Shows measured and predicted points in each 3D view", [],
             state => does(WorkbenchCommand::SetBothClouds(!state.workbench.both_clouds));
-        CompareMode, View, "Next comparison", "Switches between side by side and difference in Compare", [shift("F")],
-            _ => does(prefer(|s| s.compare_mut().mode = next_of(&s.compare_mut().mode)));
-        SwapCompared, View, "Swap A and B", "Swaps A and B in Compare", [shift("R")],
-            _ => does(prefer(|s| *s.compare_mut() = s.compare_mut().clone().swapped()));
         Parallel, View, "Parallel projection", "No perspective in 3D", [plain("I")],
             _ => does(prefer(|s| s.scene.orthographic ^= true));
         Footprint, View, "GelSlim window", "Outlines what the GelSlim sees, on bubble images", [],
             _ => does(prefer(|s| s.footprint_visible ^= true));
         SwitchTheme, View, "Dark theme", "Switches between the dark and the light theme", [],
             _ => does(prefer(|s| s.theme = next_of(&s.theme)));
-        InspectWorkspace, View, "Inspect", "Measured and predicted side by side", [],
-            _ => does(prefer(|s| s.workspace = Workspace::Inspect));
-        AlignWorkspace, View, "Align", "Contact points on the CAD model", [],
-            _ => does(prefer(|s| s.workspace = Workspace::Align));
-        LabelWorkspace, View, "Label", "Edit contact masks and review pairs", [],
-            _ => does(prefer(|s| s.workspace = Workspace::Label));
-        EvaluateWorkspace, View, "Evaluate", "Scores and tables", [],
-            _ => does(prefer(|s| s.workspace = Workspace::Evaluate));
-        AdaptWorkspace, View, "Adapt", "Generator and mask model made better on your own sensors", [],
-            _ => does(prefer(|s| s.workspace = Workspace::Adapt));
         ResetWorkspace, View, "Reset workspace", "Puts the panes of this workspace back to the default layout", [],
             _ => ui(UiRequest::ResetWorkspace);
         MaximizePane, View, "Maximize pane", "Makes one pane fill the window", [plain("`")],
@@ -358,14 +304,6 @@ impl Action {
         self.behind(self.tooltip())
     }
 
-    /// True where it moves the tool in hand: Shift and Ctrl make its steps larger and smaller.
-    pub(crate) fn is_nudge(self) -> bool {
-        matches!(
-            self,
-            Self::NudgeLeft | Self::NudgeRight | Self::NudgeUp | Self::NudgeDown | Self::TurnLeft | Self::TurnRight
-        )
-    }
-
     /// Other words that people look for it by, in small letters.
     pub fn words(self) -> std::str::SplitWhitespace<'static> {
         let text = match self {
@@ -397,7 +335,7 @@ impl Action {
             Self::RunPose => "retry recompute register registration icp failed",
             Self::TryTools => "which tool wrong cad model identify rank recognize",
             Self::PoseTool => "hand gizmo drag manual move",
-            Self::LockRange | Self::RangeOnce | Self::ResetRange => "colorbar colormap scale limits minimum maximum mm",
+            Self::LockRange | Self::RangeOnce => "colorbar colormap scale limits minimum maximum mm",
             Self::Fit => "zoom center home view",
             Self::Parallel => "orthographic perspective camera",
             Self::Footprint => "rectangle outline crop",

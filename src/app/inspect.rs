@@ -31,13 +31,6 @@ pub enum InspectCommand {
     Play(bool),
 }
 
-impl InspectCommand {
-    /// Shows the applied start.
-    pub const BEGIN: Self = Self::By(i64::MIN);
-    /// Shows the last step.
-    pub const END: Self = Self::By(i64::MAX);
-}
-
 pub(super) fn step(state: &mut State, command: InspectCommand, _: &mut Vec<Effect>) {
     match command {
         InspectCommand::Source(source) => {

@@ -10,18 +10,18 @@ with_texts! {
     /// The arrangements of the same panes.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, EnumIter)]
     #[serde(rename_all = "snake_case")]
-    pub enum Workspace(name) {
+    pub enum Workspace(name, tooltip) {
         /// Truth and prediction side by side.
         #[default]
-        Inspect = "Inspect",
+        Inspect = "Inspect", "Measured and predicted side by side";
         /// The cloud on the CAD.
-        Align = "Align",
+        Align = "Align", "Contact points on the CAD model";
         /// Correcting masks.
-        Label = "Label",
+        Label = "Label", "Edit contact masks and review pairs";
         /// Numbers.
-        Evaluate = "Evaluate",
+        Evaluate = "Evaluate", "Scores and tables";
         /// Models made better on one's own sensors.
-        Adapt = "Adapt",
+        Adapt = "Adapt", "Generator and mask model made better on your own sensors";
     }
 }
 

@@ -50,7 +50,7 @@ fn generate(state: &mut State, new_seed: bool, effects: &mut Vec<Effect>) {
     if let Err(absent) = results::can_generate(state) {
         return state.log.error(&refusal(absent));
     }
-    if new_seed || !state.settings.generate.seed_locked {
+    if new_seed {
         state.settings.generate.seed = next_seed(state.settings.generate.seed);
         settings::save(state, effects);
     }

@@ -6,7 +6,7 @@ use std::time::Duration;
 use serde_json::Value;
 
 use super::source::Place;
-use super::state::settings::{SETTINGS_VERSION, Settings, WindowPlace};
+use super::state::settings::{SETTINGS_VERSION, Settings};
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::infer::store::{self, Store};
 use touch2touch_pipeline::io::statistics::ShiftStatistics;
@@ -90,11 +90,11 @@ impl Services {
         (settings, problem)
     }
 
-    /// Where the window was when it was closed. A file that cannot be read stays where it is: the studio reads it next, sets it
-    /// aside and says so.
-    pub(crate) fn window_place(&self) -> Option<WindowPlace> {
+    /// The settings for who changes nothing. A file that cannot be read stays where it is, for the studio to set aside and to say
+    /// so.
+    pub(crate) fn peek_settings(&self) -> Option<Settings> {
         let file = self.config_folder.as_ref()?.join(SETTINGS_FILE);
-        parse_settings(&files::read(&file, files::SMALL).ok()?).ok()?.0.validated().last.window
+        Some(parse_settings(&files::read(&file, files::SMALL).ok()?).ok()?.0.validated())
     }
 
     /// Writes the settings.
@@ -216,7 +216,7 @@ mod tests {
         for bad in ["", "[1, 2", r#"{"version": 999}"#, r#"{"theme": "light"}"#] {
             std::fs::write(&file, bad).unwrap();
             // The window asks first, and leaves it to the studio to say what is wrong.
-            assert!(services.window_place().is_none() && file.exists());
+            assert!(services.peek_settings().is_none() && file.exists());
             let (settings, problem) = services.load_settings();
             assert_eq!(settings, Settings::default(), "{bad}");
             assert!(problem.unwrap().hint.unwrap().contains(BAD_SETTINGS_FILE));
@@ -229,7 +229,7 @@ mod tests {
         for (size, there) in [("[900, 700]", true), ("[0, 700]", false), ("[900, 1e30]", false)] {
             let last = format!(r#"{{"window": {{"position": [-3, 4], "size": {size}, "maximized": true}}}}"#);
             std::fs::write(&file, format!(r#"{{"version": 1, "last": {last}}}"#)).unwrap();
-            assert_eq!(services.window_place().is_some(), there, "{size}");
+            assert_eq!(services.peek_settings().unwrap().last.window.is_some(), there, "{size}");
         }
         // Keys that cannot be used cost nothing else, and are said.
         // A field that cannot be read falls back alone, and the file as it was is kept.

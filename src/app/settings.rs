@@ -88,9 +88,6 @@ fn follow(state: &mut State, before: &Settings) {
     if generate.preset == before.generate.preset && !generate.same_numbers(&before.generate) {
         generate.preset = None;
     }
-    if settings.mask.tool != before.mask.tool {
-        settings.mask.last_tool = before.mask.tool;
-    }
     if !settings.range.is_valid() {
         settings.range = before.range;
     }

@@ -42,6 +42,11 @@ pub enum WorkbenchCommand {
     Pick(Option<Picked>),
 }
 
+/// True where the pose tool is in hand and there is a tool to be moved.
+pub(crate) fn in_hand(state: &State) -> bool {
+    state.workbench.tool == SceneTool::Pose && results::tool(state).ready().is_some()
+}
+
 pub(super) fn step(state: &mut State, command: WorkbenchCommand, effects: &mut Vec<Effect>) {
     let pair = state.pair_key();
     let bench = &mut state.workbench;

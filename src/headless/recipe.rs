@@ -103,7 +103,7 @@ impl ModelArgs {
 
 /// The user's kept predictions with the budget of the studio's preferences; `None` without a folder for them.
 pub(super) fn kept() -> Option<Store> {
-    let (settings, _) = Services::of_user().load_settings();
+    let settings = Services::of_user().peek_settings().unwrap_or_default();
     Some(Store::new(user_folder()?, u64::from(settings.cache_mib) << 20))
 }
 

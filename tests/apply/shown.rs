@@ -198,7 +198,6 @@ fn what_a_person_picks_stays_until_the_settings_change_and_comes_back_with_them(
     let mut bench = bench();
     for seed in [42, 41] {
         bench.send(Move::Seed(seed).command(&bench.state).unwrap());
-        bench.send(with(|g| g.seed_locked = true));
         bench.run(PredictCommand::Generate);
     }
     let touch = bench.state.touch_key(RIGHT).unwrap();

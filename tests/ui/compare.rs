@@ -2,7 +2,6 @@
 
 use eframe::egui::{Event, Key, Modifiers, Pos2, Rect};
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::action::Action;
 use touch2touch::app::command::{Pane, PredictCommand};
 use touch2touch::app::keys::{ImprintKey, ImprintSource, ShiftMode};
 use touch2touch::app::results;
@@ -104,9 +103,6 @@ fn a_key_flickers_and_both_values_are_read() {
     rig.harness.run();
     let read = rig.harness.get_all_by_label_contains("A minus B ").count();
     assert!(read > 0, "both values and their difference");
-
-    rig.key(Modifiers::SHIFT, Key::F);
-    assert_eq!(rig.state().settings.compared().mode, CompareMode::Difference);
 }
 
 #[test]
@@ -119,7 +115,6 @@ fn the_choice_is_kept_per_workspace_and_what_is_not_there_says_so() {
     rig.send(prefer(|s| s.workspace = Workspace::Inspect));
     rig.restart([1280.0, 800.0]);
     assert_eq!(rig.state().settings.compared().a, subject("mean:seeds=2"), "kept in the preferences");
-    assert!(Action::SwapCompared.command(rig.state()).is_some());
     set(&mut rig, "stored", "prediction:bundle=gone", CompareMode::Side);
     assert!(rig.harness.query_all_by_label_contains("is gone; choose another").next().is_some());
 }

@@ -386,6 +386,6 @@ fn masks_are_exported_as_pictures_and_imported_again_by_clicks() {
     std::fs::create_dir(&empty).unwrap();
     rig.take_to(&empty);
     rig.harness.get_by_label_contains("there are no masks here");
-    rig.clicks(&["Close"]);
+    rig.key(Modifiers::NONE, Key::Escape);
     assert!(rig.state().export.importing.is_none());
 }

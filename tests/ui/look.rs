@@ -51,7 +51,7 @@ fn pictures_for_the_docs() {
         rig.send(PredictCommand::Generate);
         rig.shoot(&format!("{name}-demo-inspect"));
         rig.send(prefer(|s| s.workspace = Workspace::Align));
-        rig.send(Command::Inspect(InspectCommand::BEGIN));
+        rig.send(Command::Inspect(InspectCommand::By(i64::MIN)));
         rig.send(Command::Inspect(InspectCommand::By(4)));
         rig.shoot(&format!("{name}-demo-align"));
         rig.send(Command::Inspect(InspectCommand::Start(Some(STRAY))));

@@ -12,7 +12,7 @@ impl Action {
     /// True where its letter means it only where masks are drawn: it changes labels, or what the tools do to them.
     pub(crate) fn is_of_labeling(self) -> bool {
         use Action as A;
-        let looks = matches!(self, A::MaskVisible | A::MaskOutline | A::MaskFainter | A::MaskStronger);
+        let looks = matches!(self, A::MaskVisible | A::MaskOutline);
         self.group() == Group::Mask && !looks
     }
 
@@ -28,7 +28,7 @@ impl Action {
                 matches!(self, Self::PredictAll | Self::ExportTable | Self::NextWorst)
             }
             Workspace::Adapt => {
-                matches!(self, Self::FitPairs | Self::UseFit | Self::TrainMasks | Self::StartTraining)
+                matches!(self, Self::FitPairs | Self::UseModel | Self::TrainMasks | Self::StartTraining)
             }
         }
     }
@@ -36,7 +36,7 @@ impl Action {
     fn is_of_pane(self, pane: Pane) -> bool {
         use Action as A;
         let picture = matches!(self, A::Fit | A::SavePane | A::CopyPane | A::CopyHovered | A::MaximizePane);
-        let range = matches!(self, A::LockRange | A::RangeOnce | A::ResetRange);
+        let range = matches!(self, A::LockRange | A::RangeOnce);
         match pane.kind() {
             Kind::Form => match pane {
                 Pane::Browser => self.group() == Group::Navigate,
@@ -45,10 +45,8 @@ impl Action {
                 _ => false,
             },
             Kind::Color => picture,
-            Kind::Imprint(_) => {
-                picture || range || matches!(self, A::MaskVisible | A::MaskOutline | A::MaskFainter | A::MaskStronger)
-            }
-            Kind::Compare => picture || range || matches!(self, A::CompareMode | A::SwapCompared),
+            Kind::Imprint(_) => picture || range || matches!(self, A::MaskVisible | A::MaskOutline),
+            Kind::Compare => picture || range,
             Kind::Scene => picture || self.is_of_scene(),
             Kind::Steps => self.is_of_steps(),
         }
@@ -57,18 +55,17 @@ impl Action {
     /// True where it is about the 3D views.
     fn is_of_scene(self) -> bool {
         use Action as A;
-        let look = matches!(self, A::CameraLeft | A::CameraRight | A::CameraFront | A::CameraBack | A::CameraTop)
-            || matches!(self, A::CameraBottom | A::CameraOblique | A::Distances)
-            || matches!(self, A::Parallel | A::NextLayer | A::BothClouds);
-        look || self.is_nudge()
-            || matches!(self, A::PoseTool | A::IcpFromHere | A::Accept | A::RevertHand)
+        let look = matches!(self, A::CameraLeft | A::CameraRight | A::CameraFront | A::CameraTop)
+            || matches!(self, A::CameraOblique | A::Distances)
+            || matches!(self, A::Parallel | A::BothClouds);
+        look || matches!(self, A::PoseTool | A::IcpFromHere | A::Accept | A::RevertHand)
             || matches!(self, A::PlaySteps | A::PaintIn3d | A::PaintLayers)
     }
 
     /// True where it is about the steps of a registration.
     fn is_of_steps(self) -> bool {
         use Action as A;
-        matches!(self, A::StepBack | A::StepForward | A::FirstStep | A::LastStep | A::PlaySteps | A::OwnStarts)
+        matches!(self, A::StepBack | A::StepForward | A::PlaySteps | A::OwnStarts)
     }
 }
 
@@ -87,7 +84,7 @@ mod tests {
             assert!(Action::iter().any(|action| action.is_of_pane(pane)), "{pane:?}");
         }
         assert!(Action::Brush.is_of(Workspace::Label, None) && !Action::Brush.is_of(Workspace::Align, None));
-        assert!(Action::LastStep.is_of(Workspace::Inspect, Some(Pane::Steps)));
-        assert!(!Action::LastStep.is_of(Workspace::Inspect, Some(Pane::Measured)));
+        assert!(Action::StepBack.is_of(Workspace::Inspect, Some(Pane::Steps)));
+        assert!(!Action::StepBack.is_of(Workspace::Inspect, Some(Pane::Measured)));
     }
 }

@@ -53,9 +53,6 @@ pub(super) const fn shift(key: &'static str) -> Shortcut {
 pub(super) const fn alt(key: &'static str) -> Shortcut {
     Shortcut { alt: true, ..plain(key) }
 }
-pub(super) const fn alt_shift(key: &'static str) -> Shortcut {
-    Shortcut { alt: true, ..shift(key) }
-}
 pub(super) const fn ctrl(key: &'static str) -> Shortcut {
     Shortcut { ctrl: true, ..plain(key) }
 }

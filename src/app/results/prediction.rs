@@ -23,6 +23,8 @@ use touch2touch_pipeline::steps::models::KeptPrediction;
 use touch2touch_pipeline::steps::predict::Generating;
 use touch2touch_pipeline::steps::prediction::Prediction;
 
+/// A picture on the way after the first step and after every so many.
+const PREVIEW_STEPS: u32 = 4;
 /// The time between two looks whether a pair is still on screen, before its prediction begins.
 const LOOK: Duration = Duration::from_millis(10);
 
@@ -292,5 +294,5 @@ pub fn preview_request(state: &State) -> PreviewRequest {
         Some(pair) => state.fingers().into_iter().map(|finger| pair.finger(finger)).collect(),
         None => Default::default(),
     };
-    PreviewRequest { every: state.settings.generate.preview_every, shift: state.settings.shift, touches }
+    PreviewRequest { every: PREVIEW_STEPS, shift: state.settings.shift, touches }
 }

@@ -1,6 +1,5 @@
 //! [`Cache`]: values by recipe within a budget of bytes.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -9,7 +8,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// Reading marks a value as used through a shared reference, so views can do it.
 #[derive(Debug)]
 pub struct Cache<K, V> {
-    entries: BTreeMap<K, Entry<V>>,
+    /// By key. No tree: there are a score of kinds of caches, and each tree costs seconds of the build.
+    entries: Vec<(K, Entry<V>)>,
     bytes: usize,
     budget: usize,
     clock: AtomicU64,
@@ -22,15 +22,15 @@ struct Entry<V> {
     used: AtomicU64,
 }
 
-impl<K: Ord + Clone, V> Cache<K, V> {
+impl<K: Ord, V> Cache<K, V> {
     /// An empty cache that holds at most `budget` bytes (one value larger than that is kept until the next).
     pub fn new(budget: usize) -> Self {
-        Self { entries: BTreeMap::new(), bytes: 0, budget, clock: AtomicU64::new(0) }
+        Self { entries: Vec::new(), bytes: 0, budget, clock: AtomicU64::new(0) }
     }
 
     /// The value of `key`, now the most recently used.
     pub fn get(&self, key: &K) -> Option<&Arc<V>> {
-        let entry = self.entries.get(key)?;
+        let (_, entry) = &self.entries[self.find(key).ok()?];
         entry.used.store(self.tick(), Ordering::Relaxed);
         Some(&entry.value)
     }
@@ -42,29 +42,27 @@ impl<K: Ord + Clone, V> Cache<K, V> {
 
     /// True where `key` has a value.
     pub fn contains(&self, key: &K) -> bool {
-        self.entries.contains_key(key)
+        self.find(key).is_ok()
     }
 
     /// Stores a value that holds `bytes`, and drops old ones until the budget is kept.
     pub fn insert(&mut self, key: K, value: Arc<V>, bytes: usize) {
-        let used = AtomicU64::new(self.tick());
-        if let Some(old) = self.entries.insert(key, Entry { value, bytes, used }) {
-            self.bytes -= old.bytes;
+        let entry = Entry { value, bytes, used: AtomicU64::new(self.tick()) };
+        match self.find(&key) {
+            Ok(at) => self.bytes -= std::mem::replace(&mut self.entries[at].1, entry).bytes,
+            Err(at) => self.entries.insert(at, (key, entry)),
         }
         self.bytes += bytes;
         while self.bytes > self.budget && self.entries.len() > 1 {
-            let oldest =
-                self.entries.iter().min_by_key(|(_, e)| e.used.load(Ordering::Relaxed)).map(|(k, _)| k.clone());
-            let Some(entry) = oldest.and_then(|key| self.entries.remove(&key)) else {
-                break;
-            };
-            self.bytes -= entry.bytes;
+            let used = |at: &usize| self.entries[*at].1.used.load(Ordering::Relaxed);
+            let Some(oldest) = (0..self.entries.len()).min_by_key(used) else { break };
+            self.bytes -= self.entries.remove(oldest).1.bytes;
         }
     }
 
     /// Drops what does not fulfil `keep`.
     pub fn retain(&mut self, mut keep: impl FnMut(&K) -> bool) {
-        self.entries.retain(|key, entry| {
+        self.entries.retain(|(key, entry)| {
             let kept = keep(key);
             if !kept {
                 self.bytes -= entry.bytes;
@@ -92,6 +90,11 @@ impl<K: Ord + Clone, V> Cache<K, V> {
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         self.bytes
+    }
+
+    /// Its position, or that where it would be.
+    fn find(&self, key: &K) -> Result<usize, usize> {
+        self.entries.binary_search_by(|(own, _)| own.cmp(key))
     }
 
     fn tick(&self) -> u64 {

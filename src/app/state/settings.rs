@@ -272,16 +272,12 @@ with_defaults! {
         pub steps: u32 = 10,
         /// Seed of the noise.
         pub seed: u64 = 42,
-        /// True where generating again keeps the seed.
-        pub seed_locked: bool = true,
         /// The sampler.
         pub sampler: Sampler = Sampler::Ddim,
         /// DDIM's noise share, 0..1.
         pub eta: f64 = 0.0,
         /// The training steps visited.
         pub spacing: Spacing = Spacing::Trailing,
-        /// A picture on the way after so many steps, and after the first; 0 = none.
-        pub preview_every: u32 = 4,
         /// True where both fingers are generated (the pose needs both); else only the one selected.
         pub both_fingers: bool = true,
         /// True where the pair on screen is predicted without being asked, where that costs little.
@@ -295,7 +291,6 @@ impl GenerateSettings {
     pub fn validated(mut self) -> Self {
         self.steps = self.steps.clamp(*STEPS.start(), *STEPS.end());
         self.eta = clamp_or(self.eta, 0.0, 1.0, 0.0);
-        self.preview_every = self.preview_every.min(*STEPS.end());
         self
     }
 
@@ -337,8 +332,6 @@ with_defaults! {
     pub struct MaskSettings {
         /// The tool in hand.
         pub tool: MaskTool = MaskTool::Brush,
-        /// The tool before it.
-        pub last_tool: MaskTool = MaskTool::Eraser,
         /// The paint of the tools; the eraser frees pixels.
         pub paint: Paint = Paint::Contact,
         /// Radius of brush and eraser, image pixels.

@@ -60,9 +60,11 @@ fn start(cx: &mut Cx<'_>, ui: &mut Ui, network: Network) {
         Network::Masks => (Action::StartTraining, "Start training", "Continue training"),
     };
     let (take_up, tip) = match network {
-        Network::Generator => ((Action::UseFit, "Use the fitted model"), "Predictions now come from the fitted model"),
+        Network::Generator => {
+            ((Action::UseModel, "Use the fitted model"), "Predictions now come from the fitted model")
+        }
         Network::Masks => {
-            ((Action::UseTrained, "Use the trained model"), "Automatic masks now come from the trained model")
+            ((Action::UseModel, "Use the trained model"), "Automatic masks now come from the trained model")
         }
     };
     ui.horizontal_wrapped(|ui| {

@@ -4,7 +4,6 @@ use eframe::egui::{self, Align2, Color32, ComboBox, Rect, RichText, Ui, UiBuilde
 use strum::IntoEnumIterator as _;
 
 use super::images::{absent_text, bar, canvas, failed, finger_text, hover, paint_depth, scale_note, window};
-use crate::app::action::{Action, with_keys};
 use crate::app::keys::ComparisonKey;
 use crate::app::pane::Pane;
 use crate::app::results;
@@ -145,11 +144,8 @@ fn modes(cx: &mut Cx<'_>, ui: &mut Ui, chosen: &CompareChoice) {
                 cx.push(prefer(move |s| s.compare_mut().mode = mode));
             }
         }
-        ui.separator();
-        cx.action_button(ui, Action::SwapCompared, "Swap A and B");
     });
-    let tip = "{} ([[compare_mode]]: next, [[swap_compared]]: swap, hold F: B in the place of A)";
-    let tip = with_keys(&tip.replace("{}", chosen.mode.tooltip()));
+    let tip = format!("{} (hold F: B in the place of A)", chosen.mode.tooltip());
     response.response.accessible_name("Comparison").on_hover_text(tip);
 }
 

@@ -139,18 +139,9 @@ fn numbers(cx: &mut Cx<'_>, ui: &mut Ui, new: &mut GenerateSettings) {
         reset(ui.add(drag).accessible_name("Seed"), "The same seed gives the same prediction", "42", || {
             new.seed = GenerateSettings::default().seed;
         });
-        let lock = ui.add(egui::Button::selectable(new.seed_locked, "Lock")).accessible_name("Lock the seed");
-        if lock.on_hover_text(Action::LockSeed.help()).clicked() {
-            new.seed_locked = !new.seed_locked;
-        }
         cx.action_button(ui, Action::GenerateNewSeed, "New");
     });
-    row(ui, cx.p.weak, "Preview", |ui| {
-        let drag = egui::DragValue::new(&mut new.preview_every).speed(0.1).range(0..=100);
-        let tip = "Shows an intermediate picture after every so many steps; 0 shows only the result";
-        reset(ui.add(drag.prefix("every ").suffix(" steps")).accessible_name("Preview"), tip, "4", || {
-            new.preview_every = GenerateSettings::default().preview_every;
-        });
+    row(ui, cx.p.weak, "Predict", |ui| {
         let by_itself = ui.checkbox(&mut new.by_itself, "automatically");
         by_itself.on_hover_text(
             "The pair on screen is predicted without a click where that takes less than a second on this machine, by \

@@ -24,15 +24,11 @@ fn color(p: &Palette, level: Level) -> Color32 {
     }
 }
 
-/// Links to a file that was written.
-fn links(cx: &mut Cx<'_>, ui: &mut Ui, place: &Path) {
+/// Link to a file that was written.
+fn link(cx: &mut Cx<'_>, ui: &mut Ui, place: &Path) {
     let show = ui.link(RichText::new("Open folder").size(12.0));
     if show.on_hover_text(place.display().to_string()).clicked() {
         cx.push(TasksCommand::Reveal(place.to_owned()));
-    }
-    let copy = ui.link(RichText::new("Copy the path").size(12.0));
-    if copy.on_hover_text(place.display().to_string()).clicked() {
-        ui.copy_text(place.display().to_string());
     }
 }
 
@@ -41,7 +37,7 @@ fn entry_ui(cx: &mut Cx<'_>, ui: &mut Ui, entry: &Entry) {
     let count = if entry.count > 1 { format!(" ({} times)", entry.count) } else { String::new() };
     ui.add(egui::Label::new(RichText::new(format!("{}{count}", entry.text)).color(color(p, entry.level))).wrap());
     if let Some(place) = &entry.place {
-        ui.horizontal(|ui| links(cx, ui, place));
+        ui.horizontal(|ui| link(cx, ui, place));
     }
     if let Some(hint) = &entry.hint {
         ui.add(egui::Label::new(RichText::new(hint).size(12.0).color(p.text)).wrap());
@@ -101,7 +97,7 @@ pub(crate) fn notices(cx: &mut Cx<'_>, ctx: &egui::Context) {
                         ui.label(caption(format!("and {hidden} more in the log"), cx.p));
                     }
                     if let Some(place) = &entry.place {
-                        links(cx, ui, place);
+                        link(cx, ui, place);
                     }
                     // Only the last change can be taken back first.
                     let last_change = unseen.iter().rev().find(|e| e.changed.is_some()).map(|e| e.number);

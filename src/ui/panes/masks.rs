@@ -124,7 +124,7 @@ fn paints(cx: &mut Cx<'_>, ui: &mut Ui) {
         for (paint, text, tip, color) in [
             (Paint::Contact, "contact", "The tools add contact; the right button removes it".to_owned(), CONTACT),
             (Paint::Ignore, "ignore", Action::PaintIgnore.help(), IGNORED),
-            (Paint::LetThrough, "proposal", Action::LetThrough.help(), PROPOSED),
+            (Paint::LetThrough, "proposal", "The tools accept the suggestion where they paint".to_owned(), PROPOSED),
         ] {
             if paint == Paint::LetThrough && now != paint && !results::proposes(cx.state) {
                 continue;

@@ -219,11 +219,9 @@ fn figures(cx: &Cx<'_>, ui: &mut Ui, shown: Inspected<'_>) {
 fn transport(cx: &mut Cx<'_>, ui: &mut Ui, shown: Inspected<'_>) {
     let (steps, at, run) = (shown.inspection.num_steps(shown.run), shown.at, shown.run);
     for (action, text) in [
-        (Action::FirstStep, "|<"),
         (Action::StepBack, "<"),
         (Action::PlaySteps, if cx.state.inspect.playing { "Pause" } else { "Play" }),
         (Action::StepForward, ">"),
-        (Action::LastStep, ">|"),
     ] {
         cx.action_button(ui, action, text);
     }
@@ -234,8 +232,7 @@ fn transport(cx: &mut Cx<'_>, ui: &mut Ui, shown: Inspected<'_>) {
         let mut to = at;
         let slider = Slider::new(&mut to, 0..=steps.saturating_sub(1)).show_value(false);
         let slider = ui.add_enabled(steps > 1, slider).accessible_name("Step");
-        let tip = "Step shown; 0 is the start. [[step_back]] and [[step_forward]] step, [[first_step]] and \
-                   [[last_step]] jump to the ends";
+        let tip = "Step shown; 0 is the start. [[step_back]] and [[step_forward]] step";
         if slider.on_hover_text(with_keys(tip)).changed() {
             cx.push(Command::Inspect(InspectCommand::Go { run, at: to }));
         }

@@ -28,7 +28,7 @@ use crate::app::services::Services;
 use crate::app::settings::{Last, MaskTool, Theme, WindowPlace, prefer};
 use crate::app::state::State;
 use crate::app::view::Purpose;
-use crate::app::workbench::WorkbenchCommand;
+use crate::app::workbench::{WorkbenchCommand, in_hand};
 use crate::ui::panes::log as log_pane;
 use crate::ui::parts::cx::{Cx, Shared};
 use crate::ui::parts::frame_cache::FrameCache;
@@ -529,16 +529,11 @@ impl eframe::App for StudioApp {
                 if action == Action::CancelJobs && self.panes.maximized.take().is_some() {
                     continue;
                 }
-                match action.command(state) {
-                    Some(Command::Workbench(WorkbenchCommand::Nudge(axis, by))) if action.is_nudge() => {
-                        let scale = match ctx.input(|i| i.modifiers) {
-                            held if held.command || held.ctrl => 0.1,
-                            held if held.shift => 10.0,
-                            _ => 1.0,
-                        };
-                        cx.push(Command::Workbench(WorkbenchCommand::Nudge(axis, by * scale)));
-                    }
-                    _ => cx.act(action),
+                cx.act(action);
+            }
+            if in_hand(state) && !place.covered && !place.dialog {
+                for (axis, steps) in shortcuts::nudges(&ctx) {
+                    cx.push(WorkbenchCommand::Nudge(axis, steps * axis.step()));
                 }
             }
             edited = bars::top(&mut cx, ui, &mut tree);

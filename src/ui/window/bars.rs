@@ -151,14 +151,7 @@ fn tab(cx: &mut Cx<'_>, ui: &mut Ui, workspace: Workspace) {
         let r = response.rect;
         ui.painter().hline(r.left() + 4.0..=r.right() - 4.0, r.bottom() + 1.0, Stroke::new(2.0, cx.p.accent));
     }
-    let tip = match workspace {
-        Workspace::Inspect => Action::InspectWorkspace,
-        Workspace::Align => Action::AlignWorkspace,
-        Workspace::Label => Action::LabelWorkspace,
-        Workspace::Evaluate => Action::EvaluateWorkspace,
-        Workspace::Adapt => Action::AdaptWorkspace,
-    };
-    if response.on_hover_text(tip.tooltip()).clicked() {
+    if response.on_hover_text(workspace.tooltip()).clicked() {
         cx.push(prefer(move |s| s.workspace = workspace));
     }
 }

@@ -1,6 +1,6 @@
 //! Taking things away: the menu in each pane's title.
 
-use eframe::egui::{self, DragValue, RichText, Ui, vec2};
+use eframe::egui::{self, RichText, Ui, vec2};
 use strum::IntoEnumIterator as _;
 
 use crate::app::action::Action;
@@ -112,9 +112,6 @@ pub(crate) fn import_form(cx: &mut Cx<'_>, ctx: &egui::Context) {
             if import.on_hover_text(tip).clicked() {
                 cx.push(ExportCommand::Import);
             }
-            if ui.button("Close").on_hover_text("Changes nothing").clicked() {
-                cx.push(ExportCommand::AskImport(None));
-            }
         });
     });
     if closed {
@@ -168,9 +165,6 @@ pub(crate) fn masks_form(cx: &mut Cx<'_>, ctx: &egui::Context) {
             if write.on_hover_text(tip).clicked() {
                 cx.push(ExportCommand::Place(Output::Masks));
             }
-            if ui.button("Close").on_hover_text("Writes nothing").clicked() {
-                cx.push(ExportCommand::AskMasks(false));
-            }
         });
     });
     if choice != cx.state.export.masks {
@@ -209,11 +203,6 @@ fn mask_choices(cx: &Cx<'_>, ui: &mut Ui, choice: &mut ExportChoice) {
     ui.checkbox(&mut choice.by_tool, "keep each tool in one split").on_hover_text(tip);
     let tip = "All other pixels are written as ignored";
     ui.checkbox(&mut choice.manual_checked, "only pixels painted by hand").on_hover_text(tip);
-    ui.horizontal(|ui| {
-        ui.label(caption("Split seed", cx.p));
-        let drag = ui.add(DragValue::new(&mut choice.seed).range(0..=999_999)).accessible_name("Split seed");
-        drag.on_hover_text("The same seed always gives the same split, also when pairs are added");
-    });
 }
 
 /// Division of the export; true where there is something to write.

@@ -7,6 +7,8 @@ use strum::IntoEnumIterator as _;
 use super::fuzzy::score;
 use crate::app::action::Action;
 use crate::app::command::{LibraryCommand, Pane, UiRequest, ViewCommand};
+use crate::app::pane::Workspace;
+use crate::app::settings::prefer;
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::SMALL;
 use touch2touch_core::dataset::PairId;
@@ -22,6 +24,7 @@ const ROW: f32 = 28.0;
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Entry {
     Action(Action),
+    Workspace(Workspace),
     Pane(Pane),
     Pair(PairId, String),
     Tool(String),
@@ -95,6 +98,7 @@ pub(crate) fn show(cx: &mut Cx<'_>, ctx: &egui::Context, memory: &mut Memory) {
         match entry {
             Entry::Action(action) if action != Action::Palette => cx.act(action),
             Entry::Action(_) => {}
+            Entry::Workspace(workspace) => cx.push(prefer(move |s| s.workspace = workspace)),
             Entry::Pane(pane) => cx.push(ViewCommand::Ui(UiRequest::ShowPane(pane))),
             Entry::Pair(pair, _) => cx.push(LibraryCommand::Select(pair)),
             Entry::Tool(tool) => cx.push(LibraryCommand::SetToolFilter(Some(tool))),
@@ -122,6 +126,7 @@ fn search(cx: &Cx<'_>, memory: &mut Memory) {
         }
     }
     if !query.trim().is_empty() {
+        ranked.extend(Workspace::iter().filter_map(|w| Some((score(&query, w.name())? + 8, Entry::Workspace(w)))));
         ranked.extend(Pane::iter().filter_map(|pane| Some((score(&query, pane.title())? + 6, Entry::Pane(pane)))));
         if let Some(open) = &cx.state.library.open {
             ranked.extend(open.tools.iter().filter_map(|t| Some((score(&query, t)?, Entry::Tool(t.clone())))));
@@ -144,6 +149,7 @@ fn entry_ui(cx: &Cx<'_>, ui: &mut Ui, entry: &Entry, selected: bool) -> egui::Re
             let keys = action.key_text();
             (action.name(), keys, action.command(cx.state).is_some())
         }
+        Entry::Workspace(workspace) => (workspace.name(), "workspace".to_owned(), true),
         Entry::Pane(pane) => (pane.title(), "pane".to_owned(), true),
         Entry::Pair(_, name) => (name.as_str(), "pair".to_owned(), true),
         Entry::Tool(tool) => (tool.as_str(), "tool".to_owned(), true),
@@ -161,6 +167,7 @@ fn entry_ui(cx: &Cx<'_>, ui: &mut Ui, entry: &Entry, selected: bool) -> egui::Re
             ui.painter().text(pos2(rect.left() + 8.0, y), Align2::LEFT_CENTER, name, FontId::proportional(13.0), color);
         let tip = match entry {
             Entry::Action(action) => Some(action.tooltip()),
+            Entry::Workspace(workspace) => Some(workspace.tooltip()),
             Entry::Pane(pane) => Some(pane.tip()),
             Entry::Pair(..) | Entry::Tool(_) => None,
         };

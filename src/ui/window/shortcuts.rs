@@ -8,6 +8,7 @@ use strum::IntoEnumIterator as _;
 pub(crate) use self::list::{Memory, list};
 use crate::app::action::{Action, Shortcut};
 use crate::app::pane::{Kind, Pane};
+use touch2touch_core::manual::PoseAxis;
 
 /// The toolkit's key; `None` where it has none of that name.
 fn key_of(s: Shortcut) -> Option<Key> {
@@ -76,6 +77,40 @@ pub(crate) fn pressed(ctx: &egui::Context, place: Place, possible: impl Fn(Actio
         }
     });
     actions
+}
+
+/// Moves of the tool in hand that arrow keys ask for: axis and steps. Alt turns; Shift takes ten steps, Ctrl a tenth of one, and
+/// Ctrl + Shift turns by it: many desktops keep Ctrl + Alt for themselves.
+pub(crate) fn nudges(ctx: &egui::Context) -> Vec<(PoseAxis, f64)> {
+    if ctx.egui_wants_keyboard_input() || egui::Popup::is_any_open(ctx) {
+        return Vec::new();
+    }
+    let mut asked = Vec::new();
+    ctx.input_mut(|input| {
+        input.events.retain(|event| {
+            let egui::Event::Key { key, pressed: true, modifiers: held, .. } = event else { return true };
+            let fine = held.ctrl || held.command;
+            let (axis, sign) = match (key, held.alt || (fine && held.shift)) {
+                (Key::ArrowLeft, true) => (PoseAxis::Theta, -1.0),
+                (Key::ArrowRight, true) => (PoseAxis::Theta, 1.0),
+                (Key::ArrowLeft, false) => (PoseAxis::Y, -1.0),
+                (Key::ArrowRight, false) => (PoseAxis::Y, 1.0),
+                (Key::ArrowUp, false) => (PoseAxis::Z, -1.0),
+                (Key::ArrowDown, false) => (PoseAxis::Z, 1.0),
+                _ => return true,
+            };
+            let steps = if fine {
+                0.1
+            } else if held.shift {
+                10.0
+            } else {
+                1.0
+            };
+            asked.push((axis, sign * steps));
+            false
+        });
+    });
+    asked
 }
 
 /// True where an action's keys mean it while the pointer is over a pane. Space presses what has the focus elsewhere.

@@ -186,16 +186,13 @@ fn ticket() -> impl Strategy<Value = Ticket> {
 }
 
 fn generate() -> impl Strategy<Value = GenerateSettings> {
-    (0u32..30, any::<u64>(), number(), any::<bool>(), any::<bool>()).prop_map(
-        |(steps, seed, eta, seed_locked, both)| GenerateSettings {
-            steps,
-            seed,
-            eta: eta.into(),
-            seed_locked,
-            both_fingers: both,
-            ..GenerateSettings::default()
-        },
-    )
+    (0u32..30, any::<u64>(), number(), any::<bool>()).prop_map(|(steps, seed, eta, both)| GenerateSettings {
+        steps,
+        seed,
+        eta: eta.into(),
+        both_fingers: both,
+        ..GenerateSettings::default()
+    })
 }
 
 fn mask() -> impl Strategy<Value = MaskSettings> {

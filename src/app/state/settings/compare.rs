@@ -37,10 +37,4 @@ impl CompareChoice {
     pub fn is_error(&self) -> bool {
         *self == Self::default()
     }
-
-    /// A in place of B and the other way round.
-    #[must_use]
-    pub fn swapped(self) -> Self {
-        Self { a: self.b, b: self.a, mode: self.mode }
-    }
 }

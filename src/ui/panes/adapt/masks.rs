@@ -51,10 +51,6 @@ fn form(cx: &mut Cx<'_>, ui: &mut Ui) {
         let percent = DragValue::new(&mut form.choice.held_out_percent).range(0..=MOST_HELD_OUT).suffix(" %");
         let percent = ui.add(percent).accessible_name("Pairs left out for the score");
         percent.on_hover_text("This share of the pairs, with both fingers, is not trained on and gives the score");
-        ui.label(caption("Seed", cx.p));
-        let seed = ui.add(DragValue::new(&mut form.choice.seed).range(0..=999_999));
-        seed.accessible_name("Seed of the training")
-            .on_hover_text("Decides which pairs are left out, and the order and augmentation of the masks");
     });
     let tip = "Off: pairs reserved for tests (test_only) are left out, so that no model is scored on what it was \
                trained on";

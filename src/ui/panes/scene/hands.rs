@@ -2,7 +2,7 @@
 
 use eframe::egui::{self, Button, Color32, Rect, RichText, Ui, UiBuilder, vec2};
 
-use crate::app::action::{Action, with_keys};
+use crate::app::action::Action;
 use crate::app::keys::ImprintSource;
 use crate::app::results;
 use crate::app::state::State;
@@ -12,6 +12,9 @@ use crate::ui::parts::theme::{SMALL, caption};
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::manual::PoseDifference;
 use touch2touch_core::units;
+
+/// The keys that move the tool in hand.
+const KEYS: &str = "arrow keys 0.1 mm · Alt + Left, Right 0.5° · Shift ×10 · Ctrl ÷10";
 
 /// The pose that a hand holds on a side, or would hold.
 fn held(state: &State, source: ImprintSource) -> Option<PlanarPose> {
@@ -61,9 +64,7 @@ pub(super) fn strip(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: R
                     cx.acting(ui, action, button.min_size(vec2(0.0, 20.0)), name);
                 }
             });
-            let keys = "[[nudge_left]], [[nudge_right]], [[nudge_up]], [[nudge_down]] 0.1 mm · [[turn_left]], [[turn_right]] 0.5° · \
-                        Shift ×10 · Ctrl ÷10";
-            ui.label(caption(with_keys(keys), cx.p));
+            ui.label(caption(KEYS, cx.p));
         });
     });
 }

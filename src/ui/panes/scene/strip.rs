@@ -14,14 +14,12 @@ use crate::ui::parts::widget::icon::{self, Icon};
 pub(super) const WIDTH: f32 = 34.0;
 
 /// Ways to look at a scene, in the menu of views.
-const VIEWS: [Action; 8] = [
+const VIEWS: [Action; 6] = [
     Action::Fit,
     Action::CameraLeft,
     Action::CameraRight,
     Action::CameraFront,
-    Action::CameraBack,
     Action::CameraTop,
-    Action::CameraBottom,
     Action::CameraOblique,
 ];
 

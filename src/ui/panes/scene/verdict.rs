@@ -1,12 +1,12 @@
 //! The verdict on a pose: one line above the picture, colored by the worst of what is known; the rest on demand.
 
+use crate::app::pane::Workspace;
 use crate::app::results;
 use crate::app::settings::prefer;
 use eframe::egui::{Align, Button, Color32, Layout, RichText, Sense, Ui, UiBuilder, vec2};
 
 use super::hands;
 use super::overlay::{difference, lower_first, pose_details, pose_time, step_text};
-use crate::app::action::Action;
 use crate::app::keys::ImprintSource;
 use crate::app::settings::MaskSource;
 use crate::app::state::{Absent, Lookup, State};
@@ -55,7 +55,7 @@ pub(super) fn line(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, first: b
             ui.put(place, button).on_hover_text(tip).clicked()
         };
         if offer("Open in Label", "Edit the mask there, or choose another source") {
-            cx.act(Action::LabelWorkspace);
+            cx.push(prefer(|s| s.workspace = Workspace::Label));
         }
         let tip = "Makes everything deeper than a threshold contact, in all pairs";
         if !threshold && offer("Use threshold", tip) {

@@ -16,8 +16,6 @@ pub(crate) const IMAGE: &[(&str, &str)] = &[
 /// Controls of the comparison of any two imprints.
 pub(crate) const COMPARE: &[(&str, &str)] = &[
     ("Click on A or B", "choose what to compare"),
-    ("[[swap_compared]]", "swap A and B"),
-    ("[[compare_mode]]", "side by side, difference"),
     ("Hold F", "show B instead of A"),
     ("Hover", "both values and their difference, in the status bar"),
     ("Wheel, drag, double-click", "zoom, move, fit"),
@@ -43,7 +41,8 @@ pub(crate) const SCENE: &[(&str, &str)] = &[
     ("Hover", "cross-hair in the images"),
     ("Click a point", "read it"),
     ("[[pose_tool]]", "pose tool: keys or handles; [[accept]] accepts, [[cancel_jobs]] reverts"),
-    ("[[distances]], [[next_layer]]", "distance to the CAD in mm; other colorings"),
+    ("Arrow keys with the pose tool", "move by 0.1 mm; Alt turns by 0.5°; Shift ×10, Ctrl ÷10"),
+    ("[[distances]]", "distance to the CAD in mm"),
     ("[[parallel]]", "parallel projection"),
     ("Click on the colored dots", "legend: show or hide"),
 ];
@@ -53,7 +52,6 @@ pub(crate) const STEPS: &[(&str, &str)] = &[
     ("Drag in the curves", "go through the steps"),
     ("Click on a curve", "show that start and step"),
     ("[[step_back]] and [[step_forward]]", "previous and next step"),
-    ("[[first_step]] and [[last_step]]", "first and last step"),
     ("[[play_steps]]", "play or pause, also over a 3D view"),
 ];
 
