@@ -166,7 +166,7 @@ pub fn learned(end: &Learned, state: &mut State, effects: &mut Vec<Effect>) {
             state.log.saved(format!("Trained: {}{scores}", bundle.name), trained.bundle.clone());
             add(state, Network::Masks, bundle);
             if trained.is_worse() {
-                let hint = "Train longer or on more masks; \"Use the trained mask model\" uses it anyway.";
+                let hint = "Train longer or on more masks; \"Use the new model\" uses it anyway.";
                 let text = "The trained mask model is worse on other pairs and is not used";
                 state.log.push(Level::Warning, text, None, Some(hint.into()));
             } else {

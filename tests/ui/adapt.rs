@@ -39,7 +39,7 @@ fn the_model_is_fitted_by_a_click_scored_and_used() {
     rig.harness.get_all_by_label("Fitted").next().expect("the picture of the fit");
     // Fitted, but not taken yet.
     assert_eq!(recipe::bundle(rig.state(), BundleKind::Generator).unwrap().id, shipped.id);
-    rig.click("Use the fitted model");
+    rig.click("Use the new model");
     rig.settle();
     let state = rig.state();
     let now = recipe::bundle(state, BundleKind::Generator).unwrap();

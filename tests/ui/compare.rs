@@ -63,8 +63,8 @@ fn any_two_imprints_are_compared_where_somebody_looks() {
     let at = (60, 70);
     let before = compared.error[at];
 
-    // Swapped, the sign changes and nothing else.
-    rig.key(Modifiers::SHIFT, Key::R);
+    // The other way round, the sign changes and nothing else.
+    set(&mut rig, "measured", "prediction", CompareMode::Difference);
     let after = results::subjects_compared(rig.state(), &b, &Subject::shown(), lab::RIGHT).ready().unwrap().error[at];
     assert_eq!(after, -before);
     assert_eq!(rig.state().settings.compared().b, Subject::shown());

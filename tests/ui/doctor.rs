@@ -83,7 +83,7 @@ fn real_pairs_are_fitted_from_the_panel_and_the_fit_is_used_at_once() {
     rig.harness.get_all_by_label("Fitted").next().expect("the picture of the fit");
     // Used at once: what is on screen is predicted anew.
     assert!(state.results.predictions.iter().next().is_none());
-    rig.click("Use the fitted model");
+    rig.click("Use the new model");
     let state = rig.state();
     let fitted = learn::made(state, Network::Generator).unwrap().id.clone();
     let made: Vec<_> = state.results.predictions.iter().map(|(key, _)| key.clone()).collect();

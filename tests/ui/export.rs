@@ -54,7 +54,7 @@ fn cloud_pose_and_mesh_are_exported_and_the_command_is_copied_from_the_menu_of_a
     rig.take_to(&folder);
     // The note says where.
     rig.harness.get_all_by_label("Open folder").next().expect("the note leads to its folder");
-    assert_eq!(rig.state().log.entries.back().unwrap().place.as_deref(), Some(folder.as_path()));
+    assert!(rig.state().log.entries.back().unwrap().place.as_ref().unwrap().starts_with(&folder));
     let mut names: Vec<String> =
         std::fs::read_dir(&folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
     names.sort();

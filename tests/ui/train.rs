@@ -56,7 +56,7 @@ fn the_mask_model_is_trained_by_a_click_to_the_verbs_bundle_and_taken_into_use()
     assert!(state.log.entries.iter().any(|entry| entry.text.starts_with("Trained: ")));
     rig.harness.get_by_label_contains("mean of 4");
     if found.is_worse() {
-        rig.click("Use the trained model");
+        rig.click("Use the new model");
     }
     assert!(learn::in_use(rig.state(), Network::Masks));
     rig.harness.get_by_label("in use");

@@ -59,13 +59,9 @@ fn start(cx: &mut Cx<'_>, ui: &mut Ui, network: Network) {
         Network::Generator => (Action::FitPairs, "Fit to my pairs", "Continue the fit"),
         Network::Masks => (Action::StartTraining, "Start training", "Continue training"),
     };
-    let (take_up, tip) = match network {
-        Network::Generator => {
-            ((Action::UseModel, "Use the fitted model"), "Predictions now come from the fitted model")
-        }
-        Network::Masks => {
-            ((Action::UseModel, "Use the trained model"), "Automatic masks now come from the trained model")
-        }
+    let tip = match network {
+        Network::Generator => "Predictions now come from the fitted model",
+        Network::Masks => "Automatic masks now come from the trained model",
     };
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = vec2(8.0, 4.0);
@@ -81,7 +77,7 @@ fn start(cx: &mut Cx<'_>, ui: &mut Ui, network: Network) {
         if learn::in_use(cx.state, network) {
             ui.label(RichText::new("in use").color(cx.p.good)).on_hover_text(tip);
         } else if learn::made(cx.state, network).is_some() {
-            cx.action_button(ui, take_up.0, take_up.1);
+            cx.action_button(ui, Action::UseModel, Action::UseModel.name());
         }
     });
 }
