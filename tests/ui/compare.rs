@@ -1,6 +1,6 @@
 //! Any two imprints against each other: figures, pictures, and that nothing is made out of sight.
 
-use eframe::egui::{Event, Key, Modifiers, Pos2, Rect};
+use eframe::egui::{Event, Key, Pos2, Rect};
 use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::command::{Pane, PredictCommand};
 use touch2touch::app::keys::{ImprintKey, ImprintSource, ShiftMode};
