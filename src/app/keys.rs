@@ -395,7 +395,7 @@ pub struct ToolKey {
 pub struct Read {
     pub(crate) labels: PairLabels,
     /// The gestures of earlier runs.
-    pub(crate) told: JournalHistory,
+    pub(crate) past: JournalHistory,
 }
 
 /// The plan of an export, of what is drawn and marked now.

@@ -58,13 +58,13 @@ pub enum Cause {
     Axes(Vec<String>, Axes),
     /// CAD models of these tools are not theirs, and no other one is.
     NotItsModel(Vec<String>),
-    /// Some of the pairs were felt as another tool than they are named after.
+    /// Some of the pairs are of another tool than they are named after.
     OtherToolOfSome,
     /// The color images of some of the pairs are those of the other finger.
     SwappedInSome,
     /// One finger's imprints are wrong, and are to be read so if that is known.
     Finger(Option<ReadAs>),
-    /// One finger felt nothing.
+    /// One finger touched nothing.
     NothingFelt,
     /// The touched image is the untouched one, pixel by pixel.
     SameImages,
@@ -72,7 +72,7 @@ pub enum Cause {
     NoReference,
     /// The color images are gray.
     Gray,
-    /// True poses are not where the tool was felt.
+    /// True poses are not where the imprints are.
     Poses(Mismatch),
     /// Imprints do not lie on their CAD models, and nothing that was tried explains it.
     Unexplained,
@@ -155,13 +155,13 @@ pub type Predict<'a> = &'a mut dyn FnMut(&[&Sample]) -> Option<Vec<Placed>>;
 /// Doubts about data of which these pairs are a handful. `tools` has the CAD models by tool, in meters.
 ///
 /// A doubt of the imprints is taken for true before the images are looked at, and so on.
-pub fn judge(felt: &[PairInput<'_>], tools: &BTreeMap<String, TriMesh>, predict: Option<Predict<'_>>) -> Vec<Doubt> {
+pub fn judge(pairs: &[PairInput<'_>], tools: &BTreeMap<String, TriMesh>, predict: Option<Predict<'_>>) -> Vec<Doubt> {
     let mut doubts = Vec::new();
-    let depths: Vec<Sample> = felt.iter().map(|felt| only(felt.sample, false)).collect();
+    let depths: Vec<Sample> = pairs.iter().map(|pair| only(pair.sample, false)).collect();
     let depths: Vec<PairInput<'_>> =
-        felt.iter().zip(&depths).map(|(felt, sample)| PairInput { sample, ..*felt }).collect();
+        pairs.iter().zip(&depths).map(|(pair, sample)| PairInput { sample, ..*pair }).collect();
     doubts.extend(of_imprints(&depths, tools));
-    let images = images::judge(felt);
+    let images = images::judge(pairs);
     let sound = images.is_none();
     doubts.extend(images);
     // Without images to go by a prediction says nothing.
@@ -169,43 +169,43 @@ pub fn judge(felt: &[PairInput<'_>], tools: &BTreeMap<String, TriMesh>, predict:
     let imprints_known = doubts.iter().all(|doubt| doubt.cause != Cause::Unexplained);
     if let Some(predict) = predict.filter(|_| readable && imprints_known) {
         let readings: Vec<ReadAs> = doubts.iter().filter_map(Doubt::read_as).collect();
-        let read: Vec<Sample> = felt.iter().map(|felt| ReadAs::all(&readings, felt.sample)).collect();
+        let read: Vec<Sample> = pairs.iter().map(|pair| ReadAs::all(&readings, pair.sample)).collect();
         doubts.extend(predictions::judge(&read, sound, predict));
     }
     doubts
 }
 
 /// Figures of the registrations of some pairs: before and after a cure they tell what the cure is worth.
-pub fn worth(felt: &[PairInput<'_>], tools: &BTreeMap<String, TriMesh>) -> Worth {
-    poses::Registered::of(felt, &poses::models(felt, tools)).worth()
+pub fn worth(pairs: &[PairInput<'_>], tools: &BTreeMap<String, TriMesh>) -> Worth {
+    poses::Registered::of(pairs, &poses::models(pairs, tools)).worth()
 }
 
 /// Doubt about imprints, CAD models and true poses, which are judged together: each of the three may be what is wrong.
-fn of_imprints(felt: &[PairInput<'_>], tools: &BTreeMap<String, TriMesh>) -> Option<Doubt> {
-    let models = poses::models(felt, tools);
-    let registered = poses::Registered::of(felt, &models);
-    let of_all = of_all_imprints(felt, tools, &models, &registered);
+fn of_imprints(pairs: &[PairInput<'_>], tools: &BTreeMap<String, TriMesh>) -> Option<Doubt> {
+    let models = poses::models(pairs, tools);
+    let registered = poses::Registered::of(pairs, &models);
+    let of_all = of_all_imprints(pairs, tools, &models, &registered);
     let explained = |doubt: &Doubt| !matches!(doubt.cause, Cause::Unexplained | Cause::Poses(Mismatch::Unknown));
     if registered.agree() || of_all.as_ref().is_some_and(explained) {
         return of_all;
     }
-    parts::of_fingers(felt, tools, &models).or(of_all).or_else(|| registered.mostly_wrong())
+    parts::of_fingers(pairs, tools, &models).or(of_all).or_else(|| registered.mostly_wrong())
 }
 
 /// Doubt about the imprints of all pairs and both fingers together.
 fn of_all_imprints(
-    felt: &[PairInput<'_>],
+    pairs: &[PairInput<'_>],
     tools: &BTreeMap<String, TriMesh>,
     models: &poses::Models<'_>,
     registered: &poses::Registered<'_, '_>,
 ) -> Option<Doubt> {
-    let mismatch = registered.mismatch(felt);
+    let mismatch = registered.mismatch(pairs);
     if let Some((mismatch, _)) = mismatch.filter(|(mismatch, _)| mismatch.is_rigid()) {
         // No mirror image and no factor of the imprints looks like this.
         return Some(registered.doubt(mismatch));
     }
-    let samples: Vec<&Sample> = felt.iter().map(|felt| felt.sample).collect();
-    let named: Vec<Option<&str>> = felt.iter().map(|felt| felt.tool).collect();
+    let samples: Vec<&Sample> = pairs.iter().map(|pair| pair.sample).collect();
+    let named: Vec<Option<&str>> = pairs.iter().map(|pair| pair.tool).collect();
     let by_imprints = imprints::judge(&samples, &named, tools, !registered.agree());
     if let Some((mismatch, likeness)) = mismatch {
         // An explanation is better than none, and of two the likelier.
@@ -220,18 +220,18 @@ fn of_all_imprints(
         Cause::Stored(read_as) => {
             let read: Vec<Sample> = samples.iter().map(|sample| ReadAs::all(&[*read_as], sample)).collect();
             let read: Vec<PairInput<'_>> =
-                felt.iter().zip(&read).map(|(felt, sample)| PairInput { sample, ..*felt }).collect();
+                pairs.iter().zip(&read).map(|(pair, sample)| PairInput { sample, ..*pair }).collect();
             registered.is_cured_by(&poses::Registered::of(&read, models))
         }
         Cause::Axes(tools_of, axes) => {
             let turned = tools_of.iter().filter_map(|name| Some((name.clone(), axes.apply(tools.get(name)?))));
-            let models = poses::models(felt, &tools.clone().into_iter().chain(turned).collect());
-            registered.is_cured_by(&poses::Registered::of(felt, &models))
+            let models = poses::models(pairs, &tools.clone().into_iter().chain(turned).collect());
+            registered.is_cured_by(&poses::Registered::of(pairs, &models))
         }
         Cause::OtherTool(list) => {
             let other = list.iter().filter_map(|(name, other)| Some((name.clone(), tools.get(other)?.clone())));
-            let models = poses::models(felt, &tools.clone().into_iter().chain(other).collect());
-            registered.is_cured_by(&poses::Registered::of(felt, &models))
+            let models = poses::models(pairs, &tools.clone().into_iter().chain(other).collect());
+            registered.is_cured_by(&poses::Registered::of(pairs, &models))
         }
         _ => true,
     };

@@ -197,7 +197,7 @@ impl Estimate {
         self.pose().and_then(|pose| pose.verdict())
     }
 
-    /// The pair that was felt.
+    /// The pair that it is of.
     #[getter]
     fn pair(&self) -> Pair {
         self.pair.clone()
@@ -221,7 +221,7 @@ impl Estimate {
     }
 }
 
-fn felt(
+fn estimated(
     pair: &Pair,
     tool: Option<&Arc<Tool>>,
     recipe: &Whole,
@@ -251,7 +251,7 @@ pub(crate) fn estimate(
 ) -> PyResult<Estimate> {
     let (stage, tool) = (recipe::stage(stage)?, tool.map(|tool| Arc::new(Tool::of(&tool.name, tool.model.clone()))));
     let whole = given_or(py, recipe, "measured")?;
-    let results = watched(py, None, |process, cx| felt(pair, tool.as_ref(), &whole, stage, process, cx))?;
+    let results = watched(py, None, |process, cx| estimated(pair, tool.as_ref(), &whole, stage, process, cx))?;
     Ok(Estimate::of(results, pair))
 }
 
@@ -274,7 +274,7 @@ pub(crate) fn estimate_many(
         let done = std::sync::atomic::AtomicU64::new(0);
         let one = |pair: &&Pair| {
             cx.check("Estimate")?;
-            let results = felt(pair, None, &whole, stage, process, &cx.quiet())?;
+            let results = estimated(pair, None, &whole, stage, process, &cx.quiet())?;
             let so_far = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
             cx.progress(so_far, pairs.len() as u64, "estimating");
             Ok(results)

@@ -109,8 +109,8 @@ impl Computes for LabelsKey {
         let (source, name) = (state.library.open.as_ref()?.source.clone(), name(state, self)?);
         Some(Job::new(Worker::Files, format!("Labels of {name}"), move |_| {
             let labels = source.labels.load(&name)?;
-            let told = source.labels.past(&name, &labels);
-            Ok(Read { labels, told })
+            let past = source.labels.past(&name, &labels);
+            Ok(Read { labels, past })
         }))
     }
 
@@ -134,8 +134,8 @@ impl Computes for LabelsKey {
         doc.labels.insert(name.clone(), labels);
         doc.set_review(&name, review);
         doc.set_note(&name, note);
-        state.history.restore(&name, &read.told.done, &read.told.undone);
-        if let Some(problem) = &read.told.problem {
+        state.history.restore(&name, &read.past.done, &read.past.undone);
+        if let Some(problem) = &read.past.problem {
             let (why, hint) = (problem.why.clone(), problem.hint.clone());
             state.log.push(Level::Warning, problem.what.clone(), Some(why), hint);
         }

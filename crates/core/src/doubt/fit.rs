@@ -40,11 +40,11 @@ pub(super) fn relief(imprint: &DepthMap) -> Grid<f64> {
 /// depend on the imprints' size, but on where its pixels lie in space. 0 where nothing can be compared.
 pub(super) fn likeness(sample: &Sample, field: &DistanceField, grasp_from_object: PlanarPose) -> f64 {
     let object_from_grasp = grasp_from_object.inverse();
-    let (mut felt, mut outline) = (Vec::new(), Vec::new());
+    let (mut depths, mut outline) = (Vec::new(), Vec::new());
     for touch in sample.pads.iter().flatten() {
         let Some((depth, camera)) = touch.depth().zip(touch.camera()) else { continue };
         let relief = relief(&depth.imprint);
-        let first = felt.len();
+        let first = depths.len();
         for y in 0..relief.height() {
             for x in 0..relief.width() {
                 let Some(point) = lift_pixel(&depth.imprint, camera, STEP_PX * x + 1, STEP_PX * y + 1) else {
@@ -52,18 +52,18 @@ pub(super) fn likeness(sample: &Sample, field: &DistanceField, grasp_from_object
                 };
                 let off = field.sample(object_from_grasp.transform_yz(DVec2::new(point.y, point.z))).distance;
                 if off <= AROUND_M {
-                    felt.push(relief[(x, y)]);
+                    depths.push(relief[(x, y)]);
                     outline.push(-off.min(NEAR_M));
                 }
             }
         }
         // Each finger has a level of its own.
-        for values in [&mut felt[first..], &mut outline[first..]] {
+        for values in [&mut depths[first..], &mut outline[first..]] {
             let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
             values.iter_mut().for_each(|v| *v -= mean);
         }
     }
-    if felt.len() < FEWEST { 0.0 } else { correlation(&felt, &outline) }
+    if depths.len() < FEWEST { 0.0 } else { correlation(&depths, &outline) }
 }
 
 /// Correlation of values whose mean is 0; 0 where one does not vary.

@@ -46,20 +46,20 @@ const CLEARER: f64 = 0.05;
 const SIDE: usize = 128;
 
 /// Doubt about the color images of some pairs.
-pub(super) fn judge(felt: &[PairInput<'_>]) -> Option<Doubt> {
-    let touches = felt.iter().flat_map(|felt| felt.sample.pads.entries());
+pub(super) fn judge(pairs: &[PairInput<'_>]) -> Option<Doubt> {
+    let touches = pairs.iter().flat_map(|pair| pair.sample.pads.entries());
     let (pads, images): (Vec<PadId>, Vec<&ColorImages>) =
         touches.filter_map(|(pad, touch)| Some((pad, touch.color()?.images.as_ref()?))).unzip();
     if images.is_empty() {
         return None;
     }
     let faces: Vec<Face> = images.iter().map(|images| Face::of(images)).collect();
-    let colored = felt.iter().any(|felt| is_gelslim(&felt.sample.rig));
+    let colored = pairs.iter().any(|pair| is_gelslim(&pair.sample.rig));
     plain(&faces, colored)
-        .or_else(|| of_one_finger(&felt.first()?.sample.rig, &pads, &faces))
+        .or_else(|| of_one_finger(&pairs.first()?.sample.rig, &pads, &faces))
         .or_else(|| stored(&images, &faces))
-        .or_else(|| swapped(felt))
-        .or_else(|| by_light(felt, &faces))
+        .or_else(|| swapped(pairs))
+        .or_else(|| by_light(pairs, &faces))
 }
 
 /// Figures of one touch that tell at a glance.
@@ -247,10 +247,10 @@ fn wrapped_around(images: &[&ColorImages], faces: &[Face]) -> Option<Doubt> {
 }
 
 /// An untouched image that changes from pair to pair, beside a touched one that does not.
-fn swapped(felt: &[PairInput<'_>]) -> Option<Doubt> {
+fn swapped(pairs: &[PairInput<'_>]) -> Option<Doubt> {
     let mut by_pad: PerPad<Vec<[Vec<f64>; 2]>> = PerPad::default();
-    for felt in felt {
-        for (pad, touch) in felt.sample.pads.entries() {
+    for pair in pairs {
+        for (pad, touch) in pair.sample.pads.entries() {
             let Some(images) = touch.color().and_then(|color| color.images.as_ref()) else { continue };
             by_pad[pad].get_or_insert_default().push([&images.raw, &images.reference].map(blocks));
         }
@@ -289,10 +289,10 @@ fn area(image: &RgbGrid) -> RgbGrid {
 }
 
 /// Images that lie otherwise than the light says, or are in other colors.
-fn by_light(felt: &[PairInput<'_>], faces: &[Face]) -> Option<Doubt> {
+fn by_light(pairs: &[PairInput<'_>], faces: &[Face]) -> Option<Doubt> {
     // Only a GelSlim's light is known.
-    let gelslims: Vec<&PairInput<'_>> = felt.iter().filter(|felt| is_gelslim(&felt.sample.rig)).collect();
-    let touches = gelslims.iter().flat_map(|felt| felt.sample.pads.entries());
+    let gelslims: Vec<&PairInput<'_>> = pairs.iter().filter(|pair| is_gelslim(&pair.sample.rig)).collect();
+    let touches = gelslims.iter().flat_map(|pair| pair.sample.pads.entries());
     let touches: Vec<(PadId, &ColorTouch)> = touches.filter_map(|(pad, touch)| Some((pad, touch.color()?))).collect();
     let light = Light::of(touches.iter().map(|(pad, color)| (*pad, Cow::Borrowed(&color.difference))));
     if light.is_upright() {

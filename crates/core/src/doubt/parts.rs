@@ -31,15 +31,15 @@ struct Alone {
 }
 
 impl Alone {
-    fn of(felt: &[PairInput<'_>], models: &Models<'_>, pad: PadId) -> Self {
-        let samples: Vec<Sample> = felt.iter().map(|felt| alone(felt.sample, pad)).collect();
-        let each = felt.iter().zip(&samples).map(|(felt, sample)| PairInput { sample, ..*felt });
+    fn of(pairs: &[PairInput<'_>], models: &Models<'_>, pad: PadId) -> Self {
+        let samples: Vec<Sample> = pairs.iter().map(|pair| alone(pair.sample, pad)).collect();
+        let each = pairs.iter().zip(&samples).map(|(pair, sample)| PairInput { sample, ..*pair });
         let registered = Registered::of(&each.collect::<Vec<_>>(), models);
         let (tried, right, contradicting) = (registered.tried(), registered.right(), registered.contradicting());
         Self { pad, samples, tried, right, contradicting }
     }
 
-    /// Pairs in which it felt something.
+    /// Pairs in which it touched something.
     fn touched(&self) -> usize {
         let rises = |sample: &&Sample| {
             let imprint = sample.pad(self.pad).and_then(|touch| Some(&touch.depth()?.imprint));
@@ -55,12 +55,12 @@ impl Alone {
 
 /// Doubt about the imprints of one finger, where the other one's lie on the CAD models at the true poses.
 pub(super) fn of_fingers(
-    felt: &[PairInput<'_>],
+    pairs: &[PairInput<'_>],
     tools: &BTreeMap<String, TriMesh>,
     models: &Models<'_>,
 ) -> Option<Doubt> {
-    let rig = &felt.first()?.sample.rig;
-    let fingers: Vec<Alone> = rig.pads().map(|pad| Alone::of(felt, models, pad)).collect();
+    let rig = &pairs.first()?.sample.rig;
+    let fingers: Vec<Alone> = rig.pads().map(|pad| Alone::of(pairs, models, pad)).collect();
     let sound = fingers.iter().filter(|finger| finger.is_at_least(RIGHT)).max_by_key(|finger| finger.right)?;
     let is_wrong = |finger: &&Alone| {
         let contradicts = finger.contradicting as f64 >= CONTRADICTS * finger.tried as f64;
@@ -81,7 +81,7 @@ pub(super) fn of_fingers(
         "registered by the {name} alone, {} of {} poses are good and near the truth, by the {other} alone {} of {}",
         wrong.right, wrong.tried, sound.right, sound.tried
     );
-    let named: Vec<Option<&str>> = felt.iter().map(|felt| felt.tool).collect();
+    let named: Vec<Option<&str>> = pairs.iter().map(|pair| pair.tool).collect();
     let samples: Vec<&Sample> = wrong.samples.iter().collect();
     let read_as = imprints::judge(&samples, &named, tools, false).and_then(|(doubt, _)| doubt.read_as());
     let how = read_as.map_or("its imprints do not lie on the CAD models".into(), super::ReadAs::mistake);

@@ -41,7 +41,7 @@ const MOVED_M: f64 = 3e-3;
 /// True angles that differ by less are all the same, radians.
 const SAME_RAD: f64 = 1e-3;
 
-/// Difference of true poses from where the tool was felt.
+/// Difference of true poses from where the imprints are.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Mismatch {
     /// Each is the inverse.
@@ -131,9 +131,9 @@ struct Sure {
 pub(super) type Models<'a> = BTreeMap<&'a str, ToolModel>;
 
 /// The models of these pairs' tools, as far as they can be used.
-pub(super) fn models<'a>(felt: &[PairInput<'a>], tools: &BTreeMap<String, TriMesh>) -> Models<'a> {
+pub(super) fn models<'a>(pairs: &[PairInput<'a>], tools: &BTreeMap<String, TriMesh>) -> Models<'a> {
     let named: BTreeMap<&str, &TriMesh> =
-        felt.iter().filter_map(|felt| Some((felt.tool?, tools.get(felt.tool?)?))).collect();
+        pairs.iter().filter_map(|pair| Some((pair.tool?, tools.get(pair.tool?)?))).collect();
     named.par_iter().filter_map(|(name, mesh)| Some((*name, ToolModel::new((*mesh).clone()).ok()?))).collect()
 }
 
@@ -175,10 +175,10 @@ pub(super) struct Registered<'m, 'a> {
 
 impl<'m, 'a> Registered<'m, 'a> {
     /// Registers the pairs.
-    pub(super) fn of(felt: &[PairInput<'_>], models: &'m Models<'a>) -> Self {
+    pub(super) fn of(pairs: &[PairInput<'_>], models: &'m Models<'a>) -> Self {
         let tried: Vec<(usize, &Sample, &ToolModel)> = (0..)
-            .zip(felt)
-            .filter_map(|(at, felt)| Some((at, felt.sample, models.get(felt.tool?)?)))
+            .zip(pairs)
+            .filter_map(|(at, pair)| Some((at, pair.sample, models.get(pair.tool?)?)))
             .filter(|(_, sample, _)| sample.pads.iter().flatten().any(|t| t.depth().is_some() && t.camera().is_some()))
             .collect();
         let asked = tried.iter().filter(|(_, sample, _)| sample.grasp_from_object.is_some()).count();
@@ -259,13 +259,13 @@ impl<'m, 'a> Registered<'m, 'a> {
     }
 
     /// The mismatch of truth and registrations where they contradict each other, with the mean likeness where it is mended.
-    pub(super) fn mismatch(&self, felt: &[PairInput<'_>]) -> Option<(Mismatch, f64)> {
+    pub(super) fn mismatch(&self, pairs: &[PairInput<'_>]) -> Option<(Mismatch, f64)> {
         let count = self.known().count();
         let far = count - self.near();
         if count < FEWEST || (count as f64) < SURE * self.asked as f64 || (far as f64) < FAR * count as f64 {
             return None;
         }
-        let explained = self.explanations(felt).into_iter().filter_map(|(mismatch, truths)| {
+        let explained = self.explanations(pairs).into_iter().filter_map(|(mismatch, truths)| {
             let both = truths.iter().zip(self.known());
             let off = both.map(|(truth, (sure, _))| truth.map_or(f64::INFINITY, |truth| off(sure.found, truth)));
             let near = off.clone().filter(|off| *off <= 1.0).count();
@@ -276,21 +276,21 @@ impl<'m, 'a> Registered<'m, 'a> {
             Some((_, _, mismatch, truths)) => (mismatch, truths),
             None => (Mismatch::Unknown, self.known().map(|(sure, _)| Some(sure.found)).collect()),
         };
-        Some((mismatch, self.likeness(felt, &truths)))
+        Some((mismatch, self.likeness(pairs, &truths)))
     }
 
     /// The mean likeness of the good registrations with a truth at these poses.
-    fn likeness(&self, felt: &[PairInput<'_>], poses: &[Option<PlanarPose>]) -> f64 {
+    fn likeness(&self, pairs: &[PairInput<'_>], poses: &[Option<PlanarPose>]) -> f64 {
         let one = |((sure, _), pose): ((&Sure, PlanarPose), &Option<PlanarPose>)| {
-            let felt = felt[sure.at];
-            Some(likeness(&grainless(felt.sample), &self.models.get(felt.tool?)?.field, (*pose)?))
+            let pair = pairs[sure.at];
+            Some(likeness(&grainless(pair.sample), &self.models.get(pair.tool?)?.field, (*pose)?))
         };
         let found: f64 = self.known().zip(poses).filter_map(one).sum();
         found / self.known().count().max(1) as f64
     }
 
     /// Explanations of what is wrong with the truth, and the truths of the good registrations if it is.
-    fn explanations(&self, felt: &[PairInput<'_>]) -> Vec<(Mismatch, Vec<Option<PlanarPose>>)> {
+    fn explanations(&self, pairs: &[PairInput<'_>]) -> Vec<(Mismatch, Vec<Option<PlanarPose>>)> {
         let known: Vec<(Sure, PlanarPose)> = self.known().map(|(sure, truth)| (*sure, truth)).collect();
         let all = |of: &dyn Fn(&Sure, PlanarPose) -> PlanarPose| {
             known.iter().map(|(sure, truth)| Some(of(sure, *truth))).collect::<Vec<_>>()
@@ -315,7 +315,7 @@ impl<'m, 'a> Registered<'m, 'a> {
             tried.push((Mismatch::Angle(off), with_angle(&|theta| theta - off)));
         }
         for on in [-1, 1] {
-            let truths = known.iter().map(|(sure, _)| (felt[sure.at].beside?)(on));
+            let truths = known.iter().map(|(sure, _)| (pairs[sure.at].beside?)(on));
             tried.push((Mismatch::Neighbor(on), truths.collect()));
         }
         // One rigid motion on the side of the gripper, or of the object; a mere turn is that of the angles.
@@ -384,9 +384,9 @@ fn typical(motions: impl Iterator<Item = PlanarPose> + Clone) -> Option<PlanarPo
 /// The registered pose, from membranes and contact by depth alone, and the verdict on it.
 fn graded_pose(sample: &Sample, tool: &ToolModel) -> Option<(Grade, PlanarPose)> {
     let points = contact_points(sample)?;
-    let felt = sample.pads.iter().flatten().filter_map(|touch| touch.depth().zip(touch.camera()));
-    let felt = felt.filter(|(depth, _)| rest_and_top(&depth.imprint).is_some());
-    let images = felt.map(|(depth, camera)| PadImage { imprint: &depth.imprint, camera, predicted: false });
+    let depths = sample.pads.iter().flatten().filter_map(|touch| touch.depth().zip(touch.camera()));
+    let depths = depths.filter(|(depth, _)| rest_and_top(&depth.imprint).is_some());
+    let images = depths.map(|(depth, camera)| PadImage { imprint: &depth.imprint, camera, predicted: false });
     let images: Vec<_> = images.collect();
     let contacts = Contacts { points: &points, images: &images };
     let ask = Ask { evidence: true, ..Ask::default() };

@@ -112,7 +112,7 @@ pub fn likeness(predicted: &DepthMap, measured: &DepthMap, rig: &Rig, pad: PadId
         return 0.0;
     }
     let [a, b] = [predicted, measured].map(relief);
-    let (mut felt, mut seen) = (Vec::new(), Vec::new());
+    let (mut ours, mut theirs) = (Vec::new(), Vec::new());
     let window = rig.color_window(pad).map(|window| window.rectangle());
     let scale = measured.width() as f64 / a.width().max(1) as f64;
     for y in 0..a.height() {
@@ -122,14 +122,14 @@ pub fn likeness(predicted: &DepthMap, measured: &DepthMap, rig: &Rig, pad: PadId
                 (u - cx).abs() <= width / 2.0 && (v - cy).abs() <= height / 2.0
             });
             if inside {
-                felt.push(a[(x, y)]);
-                seen.push(b[(x, y)]);
+                ours.push(a[(x, y)]);
+                theirs.push(b[(x, y)]);
             }
         }
     }
-    for values in [&mut felt, &mut seen] {
+    for values in [&mut ours, &mut theirs] {
         let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
         values.iter_mut().for_each(|v| *v -= mean);
     }
-    correlation(&felt, &seen)
+    correlation(&ours, &theirs)
 }

@@ -27,9 +27,9 @@ fn set(condition: Condition, pairs: u64, config: &SimConfig) -> Set {
 
 impl Set {
     fn judged(&self) -> Vec<String> {
-        let felt: Vec<PairInput<'_>> =
+        let pairs: Vec<PairInput<'_>> =
             self.pairs.iter().map(|(tool, sample)| PairInput { tool: Some(tool), sample, beside: None }).collect();
-        judge(&felt, &self.tools, None).iter().map(|doubt| doubt.cause.key()).collect()
+        judge(&pairs, &self.tools, None).iter().map(|doubt| doubt.cause.key()).collect()
     }
 
     fn stored(&self, mistake: ReadAs) -> Self {
@@ -104,8 +104,8 @@ fn images_in_other_colors_and_those_of_one_finger_that_lie_otherwise_are_named()
 fn a_cure_is_worth_what_it_does_to_the_poses() {
     let sound = set(Condition::Plain, 4, &SimConfig::default());
     let worth = |set: &Set| {
-        let felt = set.pairs.iter().map(|(tool, sample)| PairInput { tool: Some(tool), sample, beside: None });
-        super::worth(&felt.collect::<Vec<_>>(), &set.tools)
+        let pairs = set.pairs.iter().map(|(tool, sample)| PairInput { tool: Some(tool), sample, beside: None });
+        super::worth(&pairs.collect::<Vec<_>>(), &set.tools)
     };
     let (as_is, twice) = (worth(&sound), worth(&sound.stored(ReadAs::Scale(Depths::Imprints, 2.0))));
     assert_eq!((as_is.tried, as_is.good, as_is.wrong), (4, 4, 0));
@@ -128,7 +128,7 @@ fn a_wrong_cad_model_is_named() {
 fn predictions_tell_the_fingers_of_the_images() {
     // In place of a generator: the imprints of the fingers whose images they are.
     let sound = set(Condition::Plain, 3, &SimConfig::default());
-    let felt: Vec<PairInput<'_>> =
+    let pairs: Vec<PairInput<'_>> =
         sound.pairs.iter().map(|(_, sample)| PairInput { tool: None, sample, beside: None }).collect();
     let predictor = |is_swapped: fn(usize) -> bool| {
         move |samples: &[&Sample]| {
@@ -142,11 +142,11 @@ fn predictions_tell_the_fingers_of_the_images() {
             Some(samples.iter().enumerate().map(of).collect())
         }
     };
-    assert!(judge(&felt, &BTreeMap::new(), Some(&mut predictor(|_| false))).is_empty());
-    let swapped = judge(&felt, &BTreeMap::new(), Some(&mut predictor(|_| true)));
+    assert!(judge(&pairs, &BTreeMap::new(), Some(&mut predictor(|_| false))).is_empty());
+    let swapped = judge(&pairs, &BTreeMap::new(), Some(&mut predictor(|_| true)));
     assert_eq!(swapped.iter().map(Doubt::read_as).collect::<Vec<_>>(), [Some(ReadAs::ImageSwapFingers)]);
     assert!(swapped[0].what.contains("3 of 3 pairs"), "{}", swapped[0].what);
-    let some = judge(&felt, &BTreeMap::new(), Some(&mut predictor(|at| at > 0)));
+    let some = judge(&pairs, &BTreeMap::new(), Some(&mut predictor(|at| at > 0)));
     assert_eq!((some.len(), &some[0].cause, &some[0].pairs[..]), (1, &Cause::SwappedInSome, &[1, 2][..]));
 }
 
@@ -185,10 +185,10 @@ fn true_poses_that_contradict_the_imprints_are_named_with_their_mistake() {
         let beside: Vec<_> = (0..with.len())
             .map(|at| move |on: isize| Some(stored[(at as isize + on).rem_euclid(4) as usize]))
             .collect();
-        let felt: Vec<PairInput<'_>> = (0..with.len())
+        let pairs: Vec<PairInput<'_>> = (0..with.len())
             .map(|at| PairInput { tool: Some(&sound.pairs[at].0), sample: &with[at], beside: Some(&beside[at]) })
             .collect();
-        let doubts = judge(&felt, &sound.tools, None);
+        let doubts = judge(&pairs, &sound.tools, None);
         let keys: Vec<String> = doubts.iter().map(|doubt| doubt.cause.key()).collect();
         assert_eq!(keys, named.map(str::to_owned).into_iter().collect::<Vec<_>>(), "{named:?}: {doubts:?}");
         if named == Some("poses-angle") {
@@ -246,9 +246,9 @@ fn pairs_under_another_tools_name_are_named() {
     assert!(set.judged().is_empty());
     let names = [set.pairs[1].0.clone(), set.pairs[2].0.clone()];
     (set.pairs[2].0, set.pairs[1].0) = (names[0].clone(), names[1].clone());
-    let felt: Vec<PairInput<'_>> =
+    let pairs: Vec<PairInput<'_>> =
         set.pairs.iter().map(|(tool, sample)| PairInput { tool: Some(tool), sample, beside: None }).collect();
-    let doubts = judge(&felt, &set.tools, None);
+    let doubts = judge(&pairs, &set.tools, None);
     assert_eq!(doubts.iter().map(|doubt| doubt.cause.key()).collect::<Vec<_>>(), ["other-tool-of-some"]);
     assert_eq!(doubts[0].pairs, [1, 2], "{doubts:?}");
 }

@@ -103,7 +103,7 @@ pub struct Dataset {
     /// Root folder, the same for every sub-folder that the data set was opened from; `None` for one that is built in.
     pub root: Option<PathBuf>,
     /// That folder as it was opened.
-    pub home: Option<DatasetLocation>,
+    pub location: Option<DatasetLocation>,
     /// The kind of source.
     pub kind: SourceKind,
     /// Names of all pairs in natural order.
@@ -213,8 +213,8 @@ impl Dataset {
         let Scan { root, pairs, mut problems, files, folders, meshes, source, kind, rig } = scan;
         problems.extend(super::simulated::unfinished(&root));
         let title = root.file_name().map_or_else(|| "dataset".into(), |n| n.to_string_lossy().into_owned());
-        let (home, root) = (DatasetLocation::at(&root), Some(root));
-        Self { root, home, problems, files, folders, meshes, ..Self::of_pairs(title, kind, pairs, source, rig) }
+        let (location, root) = (DatasetLocation::at(&root), Some(root));
+        Self { root, location, problems, files, folders, meshes, ..Self::of_pairs(title, kind, pairs, source, rig) }
     }
 
     /// Without files.
@@ -222,7 +222,7 @@ impl Dataset {
         Self {
             title,
             root: None,
-            home: None,
+            location: None,
             kind,
             index: Index { pairs },
             problems: Vec::new(),

@@ -60,15 +60,15 @@ mod tests {
         let (root, elsewhere) = (dir.path().join("data"), dir.path().join("renamed"));
         assert_eq!(DatasetLocation::at(&root), None);
         std::fs::create_dir(&root).unwrap();
-        let home = DatasetLocation::at(&root).unwrap();
+        let location = DatasetLocation::at(&root).unwrap();
         std::fs::write(root.join("new"), "1").unwrap();
-        assert_eq!(home.check(), Ok(()), "what lies in it may change");
+        assert_eq!(location.check(), Ok(()), "what lies in it may change");
         std::fs::rename(&root, &elsewhere).unwrap();
-        assert!(home.check().unwrap_err().to_string().ends_with("data is gone"));
+        assert!(location.check().unwrap_err().to_string().ends_with("data is gone"));
         std::fs::create_dir(&root).unwrap();
-        assert!(home.check().unwrap_err().to_string().ends_with("data is another folder now"));
+        assert!(location.check().unwrap_err().to_string().ends_with("data is another folder now"));
         std::fs::remove_dir(&root).unwrap();
         std::fs::rename(&elsewhere, &root).unwrap();
-        assert_eq!(home.check(), Ok(()), "it came back");
+        assert_eq!(location.check(), Ok(()), "it came back");
     }
 }

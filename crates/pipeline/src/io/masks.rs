@@ -160,7 +160,7 @@ pub struct MaskStore {
     /// The names of the pads.
     rig: Arc<Rig>,
     /// The data set's folder, without which nothing is written: a path where another one lies, or none, is not the place.
-    home: Option<DatasetLocation>,
+    location: Option<DatasetLocation>,
 }
 
 impl MaskStore {
@@ -178,12 +178,12 @@ impl MaskStore {
             None => names::label(&dataset.title),
         };
         let user = folders::data().map(|folder| folder.join("masks").join(key));
-        let (rig, home) = (dataset.rig.clone(), dataset.home.clone());
+        let (rig, location) = (dataset.rig.clone(), dataset.location.clone());
         // What lies at its path now says nothing about it.
-        if let Some(gone) = home.as_ref().filter(|home| home.check().is_err()) {
-            return Ok(Self { folder: gone.root().join(FOLDER), also_read: None, rig, home });
+        if let Some(gone) = location.as_ref().filter(|location| location.check().is_err()) {
+            return Ok(Self { folder: gone.root().join(FOLDER), also_read: None, rig, location });
         }
-        Ok(Self { rig, home, ..Self::choose(dataset.root.as_deref(), user)? })
+        Ok(Self { rig, location, ..Self::choose(dataset.root.as_deref(), user)? })
     }
 
     /// [`MaskStore::for_dataset`] with the two places given, for the lab's rig.
@@ -198,14 +198,14 @@ impl MaskStore {
         {
             // Labels made while the data set was read-only stay visible.
             let also_read = user_folder.filter(|folder| folder.is_dir());
-            return Ok(Self { folder: beside.clone(), also_read, rig: Rig::lab(), home: None });
+            return Ok(Self { folder: beside.clone(), also_read, rig: Rig::lab(), location: None });
         }
         let mut tried: Vec<String> = beside.iter().map(|p| p.display().to_string()).collect();
         if let Some(user) = user_folder {
             let there = user.ancestors().find(|folder| folder.is_dir());
             if there.is_some_and(is_writable) {
                 let also_read = beside.filter(|folder| folder.is_dir());
-                return Ok(Self { folder: user, also_read, rig: Rig::lab(), home: None });
+                return Ok(Self { folder: user, also_read, rig: Rig::lab(), location: None });
             }
             tried.push(user.display().to_string());
         }
@@ -215,7 +215,7 @@ impl MaskStore {
 
     /// A store in a given folder, for the lab's rig.
     pub fn in_folder(folder: PathBuf) -> Self {
-        Self { folder, also_read: None, rig: Rig::lab(), home: None }
+        Self { folder, also_read: None, rig: Rig::lab(), location: None }
     }
 
     /// Store in the same folder, for other sensors.
@@ -409,7 +409,7 @@ impl MaskStore {
 
     /// Checks that the data set is still there.
     fn at_home(&self) -> Result<(), FileError> {
-        self.home.as_ref().map_or(Ok(()), DatasetLocation::check)
+        self.location.as_ref().map_or(Ok(()), DatasetLocation::check)
     }
 
     /// Makes the folder where it is missing; never the data set's own.

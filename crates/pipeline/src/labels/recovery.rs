@@ -73,7 +73,7 @@ impl Manifest {
             format: FORMAT.into(),
             version: VERSION,
             root: dataset.root.clone(),
-            identity: dataset.home.as_ref().map(|home| home.identity()),
+            identity: dataset.location.as_ref().map(|location| location.identity()),
             title: dataset.title.clone(),
             pairs: Vec::new(),
         }
@@ -98,8 +98,8 @@ impl Manifest {
 /// The folder for a data set's labels among those that wait.
 fn folder_of(waiting: &Path, dataset: &Dataset) -> PathBuf {
     let mut name = names::label(&dataset.title);
-    if let Some(home) = &dataset.home {
-        name = format!("{name}-{}", home.identity());
+    if let Some(location) = &dataset.location {
+        name = format!("{name}-{}", location.identity());
     }
     waiting.join(name)
 }

@@ -215,15 +215,15 @@ impl<'a> Maker<'a> {
 
     /// The masks of an imprint; with `hand`, those that were drawn where there are some.
     fn contact(&self, imprint: ImprintSource, hand: bool, labels: &PairLabels) -> Result<Estimate, TaskError> {
-        self.felt(&Recipe { hand, ..self.recipe(imprint) }, Stage::Mask, labels)
+        self.estimate(&Recipe { hand, ..self.recipe(imprint) }, Stage::Mask, labels)
     }
 
-    fn felt(&self, recipe: &Recipe, stage: Stage, labels: &PairLabels) -> Result<Estimate, TaskError> {
+    fn estimate(&self, recipe: &Recipe, stage: Stage, labels: &PairLabels) -> Result<Estimate, TaskError> {
         estimate(self.touch(labels), recipe, stage, self.models, &JobCx::unwatched())
     }
 
     fn pose(&self, imprint: ImprintSource, labels: &PairLabels) -> Result<PlanarPose, TaskError> {
-        let estimate = self.felt(&self.recipe(imprint), Stage::Pose, labels)?;
+        let estimate = self.estimate(&self.recipe(imprint), Stage::Pose, labels)?;
         Ok(estimate.pose().map_err(Clone::clone)?.grasp_from_object)
     }
 
@@ -281,7 +281,7 @@ impl<'a> Maker<'a> {
         Ok(())
     }
 
-    /// The proposals that are asked for; `felt` are the imprints.
+    /// The proposals that are asked for; `estimate` has the imprints.
     fn proposals(
         &self,
         estimate: &Estimate,
@@ -308,7 +308,7 @@ impl<'a> Maker<'a> {
     }
 }
 
-/// The mask in force on a felt imprint, as a hand takes it up.
+/// The mask in force on an imprint, as a hand takes it up.
 fn taken_up(estimate: &Estimate, pad: PadId, labels: &PairLabels) -> Option<TakenUp> {
     let (contact, place) = (estimate.contact(), MaskPlace { pad, of: estimate.recipe().imprint_of() });
     let found = contact.masks[pad].as_ref()?;

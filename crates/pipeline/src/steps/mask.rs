@@ -254,7 +254,7 @@ pub fn contact_mask(
             let within_m = f64::from(limit_m.get());
             let mask = contact::cad_signed_distance(imprint, camera, &tool.distance, truth.inverse(), within_m)
                 .map_err(|err| TaskError::from_error(WHAT, &err))?;
-            felt(imprint, &mask, &inputs.sample.rig)?;
+            check_contact(imprint, &mask, &inputs.sample.rig)?;
             mask
         }
         MaskRecipe::Truth => {
@@ -269,8 +269,8 @@ pub fn contact_mask(
     Ok(contact::settled(imprint, mask, contact::flat_m(&inputs.sample.rig)))
 }
 
-/// Refuses a mask of the CAD model at the true pose where nothing was felt: it would say the pose that it was made from.
-fn felt(imprint: &DepthMap, mask: &Mask, rig: &Rig) -> Result<(), TaskError> {
+/// Refuses a mask of the CAD model at the true pose where nothing was touched: it would give the pose that it was made from.
+fn check_contact(imprint: &DepthMap, mask: &Mask, rig: &Rig) -> Result<(), TaskError> {
     let least_m = contact::flat_m(rig);
     let above = contact::stands_out(imprint, mask).filter(|above| *above < least_m);
     // A flat imprint has no contact, whatever the mask.

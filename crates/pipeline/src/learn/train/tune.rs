@@ -62,8 +62,8 @@ pub(super) fn tune(
     let every = gathered.held.len().div_ceil(LOOKED_AT).max(1);
     let looked_at: Vec<&Drawn> = gathered.held.iter().step_by(every).collect();
     let look = |tuner: &MaskTuner| {
-        let told = told(&spec, &looked_at, |imprints| tuner.probabilities(imprints))?;
-        Ok(MaskScore::mean(told.into_iter()).map_or(0.0, |told| told.dice))
+        let scores = mask_scores(&spec, &looked_at, |imprints| tuner.probabilities(imprints))?;
+        Ok(MaskScore::mean(scores.into_iter()).map_or(0.0, |score| score.dice))
     };
     let begun = |state: Option<&[u8]>| MaskTuner::new(&start, touches.clone(), config.clone(), state);
     let times = if looked_at.is_empty() { 0 } else { LOOKS };
@@ -80,8 +80,8 @@ pub(super) fn tune(
         cx.check(WHAT)?;
         cx.progress(held_out.len() as u64, gathered.held.len() as u64, "scoring masks that were left out");
         let part: Vec<&Drawn> = part.iter().collect();
-        let before = told(&spec, &part, |imprints| tuner.probabilities_at_start(imprints))?;
-        let after = told(&spec, &part, |imprints| tuner.probabilities(imprints))?;
+        let before = mask_scores(&spec, &part, |imprints| tuner.probabilities_at_start(imprints))?;
+        let after = mask_scores(&spec, &part, |imprints| tuner.probabilities(imprints))?;
         held_out.extend(part.iter().zip(before.into_iter().zip(after)).map(|(drawn, (before, after))| HeldOut {
             id: drawn.id,
             pair: drawn.pair.clone(),
@@ -188,7 +188,7 @@ fn digest(setup: &TrainSetup, gathered: &Gathered) -> String {
 }
 
 /// Compares what the network says with what was drawn, as the program would use it.
-fn told(
+fn mask_scores(
     spec: &MaskSpec,
     drawn: &[&Drawn],
     say: impl FnOnce(&[&[f32]]) -> touch2touch_tuning::Result<Vec<Vec<f32>>>,
@@ -197,7 +197,7 @@ fn told(
     let imprints: Vec<Vec<f32>> = drawn.iter().map(|drawn| drawn.touch(input).imprint_m).collect();
     let views: Vec<&[f32]> = imprints.iter().map(Vec::as_slice).collect();
     let said = say(&views).map_err(fail)?;
-    let told = |(drawn, said): (&&Drawn, Vec<f32>)| {
+    let score = |(drawn, said): (&&Drawn, Vec<f32>)| {
         let said =
             Grid::from_vec(input.size[0], input.size[1], said).map_err(|err| TaskError::from_error(WHAT, &err))?;
         let said = if input.rotation_deg == 180 { said.rotated_180() } else { said };
@@ -214,5 +214,5 @@ fn told(
             .ok_or_else(|| TaskError::new(WHAT, "the mask has another size than its imprint"))?;
         Ok(MaskScore { iou: agreed.iou, dice: agreed.dice })
     };
-    drawn.iter().zip(said).map(told).collect()
+    drawn.iter().zip(said).map(score).collect()
 }
