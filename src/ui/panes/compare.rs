@@ -138,15 +138,11 @@ const MODE: f32 = 64.0;
 /// Choice of the way, with the keys that stand for the rest.
 fn modes(cx: &mut Cx<'_>, ui: &mut Ui, chosen: &CompareChoice) {
     let combo = egui::ComboBox::from_id_salt("compared by").width(MODE).selected_text(chosen.mode.name());
-    let response = combo.show_ui(ui, |ui| {
-        for mode in CompareMode::iter() {
-            if ui.selectable_label(chosen.mode == mode, mode.name()).on_hover_text(mode.tooltip()).clicked() {
-                cx.push(prefer(move |s| s.compare_mut().mode = mode));
-            }
-        }
-    });
     let tip = format!("{} (hold F: B in the place of A)", chosen.mode.tooltip());
-    response.response.accessible_name("Comparison").on_hover_text(tip);
+    let said = |mode: &CompareMode| (mode.name(), mode.tooltip());
+    if let Some(mode) = choose(ui, combo, ("Comparison", &tip), Some(&chosen.mode), CompareMode::iter(), said) {
+        cx.push(prefer(move |s| s.compare_mut().mode = mode));
+    }
 }
 
 /// Placeholder for a picture.
