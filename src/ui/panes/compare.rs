@@ -212,11 +212,9 @@ fn difference(cx: &mut Cx<'_>, ui: &mut Ui, chosen: &CompareChoice, finger: PadI
     let histogram = picture.histogram.clone();
     over(cx, &output, chosen, finger);
     let light = Color32::from_gray(235);
-    // In a narrow pane the corners at the bottom have room for one line.
-    let finger_text = finger_text(cx.state, finger).to_lowercase();
-    let text = format!("{} minus {}, {finger_text}", chosen.a.label(), chosen.b.label());
-    output.caption(Align2::LEFT_TOP, &text, light);
-    output.caption(Align2::RIGHT_TOP, scale_note(cx.state), crate::ui::parts::theme::DARK.caution);
+    output.caption(Align2::LEFT_TOP, &format!("{} minus {}", chosen.a.label(), chosen.b.label()), light);
+    output.caption(Align2::LEFT_BOTTOM, &finger_text(cx.state, finger), light);
+    output.caption(Align2::RIGHT_BOTTOM, scale_note(cx.state), crate::ui::parts::theme::DARK.caution);
     histogram
 }
 

@@ -384,7 +384,7 @@ pub(crate) fn finger_text(state: &State, finger: PadId) -> String {
     if let Some(first) = text.get_mut(0..1) {
         first.make_ascii_uppercase();
     }
-    if state.selection.both_fingers && finger == state.selection.finger {
+    if state.fingers().len() > 1 && finger == state.selection.finger {
         text.push_str(", active");
     }
     text
