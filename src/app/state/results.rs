@@ -45,7 +45,7 @@ macro_rules! table {
         /// The predictions of a touch that lie on the disk from before.
         Stored(StoredKey => Keyed);
         /// Raw predictions: of the pair on screen, of its other finger, of what is compared.
-        Prediction(PredictionKey => Prediction, |made| made.raw.channels.iter().map(|c| c.len() * 4).sum()) in predictions, 256 * MIB;
+        Prediction(PredictionKey => Prediction, |made| made.raw.channels.iter().map(|c| c.len() * 4).sum()) in predictions, 128 * MIB;
         /// The mean of several predictions of one touch.
         Mean(MeanKey => DepthMap, |mean| mean.len() * 4) in means, 16 * MIB;
         /// A prediction of a color sensor: differences, 0..255 scale.
