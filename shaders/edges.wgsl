@@ -34,10 +34,11 @@ struct Varying {
 }
 
 @vertex
-fn vs_main(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance: u32) -> Varying {
+fn vs_main(@builtin(vertex_index) index: u32) -> Varying {
     var out: Varying;
     out.clip = NOWHERE;
-    let edge = list[instance];
+    let vertex = index % 6u;
+    let edge = list[index / 6u];
     let a = (edges.world_from_mesh * vec4<f32>(edge.a, 1.0)).xyz;
     let b = (edges.world_from_mesh * vec4<f32>(edge.b, 1.0)).xyz;
     let to_eye = towards_eye(0.5 * (a + b));

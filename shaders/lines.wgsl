@@ -23,9 +23,11 @@ struct Varying {
 }
 
 @vertex
-fn vs_main(@builtin(vertex_index) vertex: u32, @builtin(instance_index) segment: u32) -> Varying {
+fn vs_main(@builtin(vertex_index) index: u32) -> Varying {
     var out: Varying;
     out.clip = NOWHERE;
+    let vertex = index % 6u;
+    let segment = index / 6u;
     let from_end = ends[2u * segment];
     let to_end = ends[2u * segment + 1u];
     if is_hidden(from_end.position) || is_hidden(to_end.position) {

@@ -36,10 +36,11 @@ struct Varying {
 }
 
 @vertex
-fn vs_main(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance: u32) -> Varying {
+fn vs_main(@builtin(vertex_index) index: u32) -> Varying {
     var out: Varying;
     out.clip = NOWHERE;
-    let point = points[instance * cloud.stride];
+    let vertex = index % 6u;
+    let point = points[index / 6u * cloud.stride];
     if is_hidden(point.position) {
         return out;
     }

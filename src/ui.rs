@@ -25,7 +25,7 @@ use window::lost::start_again;
 /// Size of the window on the first start, points. eframe makes it smaller where the screen is.
 const WINDOW: [f32; 2] = [1600.0, 960.0];
 /// Smallest size that every workspace can be used in, points.
-const SMALLEST: [f32; 2] = [960.0, 600.0];
+const SMALLEST: [f32; 2] = [900.0, 600.0];
 
 /// The program's icon; without it where the picture cannot be read.
 fn icon() -> egui::IconData {

@@ -213,6 +213,10 @@ macro_rules! actions {
             _ => ui(UiRequest::ResetWorkspace);
         MaximizePane, View, "Maximize pane", "Makes one pane fill the window", [plain("`")],
             _ => ui(UiRequest::ToggleMaximized);
+        NextPane, View, "Next pane", "Moves the keyboard focus to the next pane; Tab then goes through its controls", [plain("F6")],
+            _ => ui(UiRequest::StepPane(1));
+        PreviousPane, View, "Previous pane", "Moves the keyboard focus to the previous pane", [shift("F6")],
+            _ => ui(UiRequest::StepPane(-1));
         Fullscreen, View, "Full screen", "Fills the screen", [plain("F11")],
             _ => ui(UiRequest::ToggleFullscreen);
         Screenshot, View, "Screenshot", "Saves a picture of the window to your Pictures folder", [plain("F12")],

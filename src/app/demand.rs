@@ -73,6 +73,22 @@ pub fn demands(state: &State) -> Vec<Request> {
     wants.list
 }
 
+/// What the visible panes would lack of the next pair, for when nothing else is to be done: who pages on finds it there.
+pub(super) fn ahead(state: &mut State) -> Vec<Request> {
+    let library = &state.library;
+    let row = state.selection.pair.and_then(|pair| library.row_of(pair));
+    let next = row.and_then(|row| library.order.get(row + 1)).copied();
+    if next.is_none() || state.document.stroke.is_some() || !state.tasks.is_idle() {
+        return Vec::new();
+    }
+    let here = std::mem::replace(&mut state.selection.pair, next);
+    let mut wanted = demands(state);
+    state.selection.pair = here;
+    // Its neighbors wait until it is on screen.
+    wanted.retain(|request| !matches!(request, Request::Sample(key) if Some(key.pair) != next));
+    wanted
+}
+
 /// Asks for the pairs before and after the selected one.
 fn neighbors(wants: &mut Demands<'_>, selected: PairKey) {
     let library = &wants.state.library;

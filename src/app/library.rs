@@ -17,7 +17,7 @@ use super::state::results::{Request, Results};
 use super::state::settings::MAX_RECENT;
 use super::state::tasks::{Level, TaskKind};
 use super::tasks::{self, Start};
-use super::{inspect, labels, settings};
+use super::{inspect, labels, results, settings};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::PadId;
 use touch2touch_pipeline::error::TaskError;
@@ -239,6 +239,7 @@ pub(super) fn select(state: &mut State, pair: PairId, effects: &mut Vec<Effect>)
         state.log.error(err);
     }
     say_notes(state);
+    results::say_masks(state);
     settings::follow_range(state);
 }
 

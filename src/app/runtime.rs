@@ -154,8 +154,10 @@ impl Runtime {
         if wanted != state.tasks.demanded {
             self.run(state, Answer::Demanded(wanted), &mut ui);
         }
+        let ahead = if self.threaded { demand::ahead(state) } else { Vec::new() };
         let services = &self.services;
-        self.workers.demand(&state.tasks.demanded, |request| {
+        let wanted = if ahead.is_empty() { &state.tasks.demanded } else { &ahead };
+        self.workers.demand(wanted, |request| {
             Some((state.library.open.as_ref()?.seq, results::job(request, state, services)?))
         });
         ui

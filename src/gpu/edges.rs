@@ -84,7 +84,8 @@ impl EdgeData {
     /// Draws with the view bound to group 0.
     pub(super) fn draw(&self, pass: &mut wgpu::RenderPass<'_>) {
         pass.set_bind_group(1, &self.bindings, &[]);
-        pass.draw(0..6, 0..self.elements.count);
+        // No instances: a program that draws takes each as a drawing of its own.
+        pass.draw(0..6 * self.elements.count, 0..1);
     }
 }
 

@@ -94,7 +94,7 @@ impl LinesData {
     /// Draws with the view bound to group 0.
     pub(super) fn draw(&self, pass: &mut wgpu::RenderPass<'_>) {
         pass.set_bind_group(1, &self.bindings, &[]);
-        pass.draw(0..6, 0..self.elements.count / 2);
+        pass.draw(0..6 * (self.elements.count / 2), 0..1);
     }
 }
 

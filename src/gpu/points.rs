@@ -121,7 +121,7 @@ impl PointsData {
     /// Draws with the view bound to group 0.
     pub(super) fn draw(&self, pass: &mut wgpu::RenderPass<'_>) {
         pass.set_bind_group(1, &self.item.bindings, &[]);
-        pass.draw(0..6, 0..self.instances);
+        pass.draw(0..6 * self.instances, 0..1);
     }
 }
 

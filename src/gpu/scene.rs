@@ -355,10 +355,11 @@ fn order(scene: &SceneData, hasty: bool) -> Vec<(Layer, String)> {
         (layer, l.name.clone())
     });
     let meshes = scene.meshes.iter().flat_map(|m| {
-        let layers: &[Layer] = match (m.style.look, m.style.edges.is_some()) {
+        let layers: &[Layer] = match (m.style.look, m.style.edges.is_some() && !hasty) {
             (Look::Veil, _) if hasty => &[Layer::VeilDepth, Layer::VeilBeside],
             (Look::Veil, _) => &[Layer::VeilDepth, Layer::VeilBeside, Layer::VeilBefore],
             (Look::XRay, _) => &[Layer::XRayMesh],
+            (Look::Outline, _) if hasty => &[Layer::Outline],
             (Look::Outline, _) => &[Layer::Outline, Layer::HiddenOutline],
             (Look::Solid, edges) if m.style.opacity < 1.0 => {
                 &[Layer::TranslucentMesh, Layer::Edges][..1 + usize::from(edges)]

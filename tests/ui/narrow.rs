@@ -1,4 +1,4 @@
-//! A window of 1024 x 700 points: nothing stands beyond its pane, in any workspace and any pane.
+//! A window of 900 x 600 points: nothing stands beyond its pane, in any workspace and any pane.
 
 use std::collections::BTreeMap;
 use touch2touch::app::settings::prefer;
@@ -12,7 +12,7 @@ use touch2touch::app::settings::Workspace;
 
 use super::rig::Rig;
 
-const SIZE: [f32; 2] = [1024.0, 700.0];
+const SIZE: [f32; 2] = [900.0, 600.0];
 /// What a frame around a control may add, points.
 const FRAME: f32 = 2.0;
 
@@ -59,7 +59,7 @@ fn beyond(rig: &Rig) -> Vec<String> {
 }
 
 #[test]
-fn no_control_is_cut_off_in_a_window_of_1024_by_700() {
+fn no_control_is_cut_off_in_a_window_of_900_by_600() {
     let Some(mut rig) = Rig::new(SIZE, 1) else { return };
     rig.send(PredictCommand::Generate);
     let mut found = Vec::new();

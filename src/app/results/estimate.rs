@@ -93,18 +93,25 @@ impl Computes for EstimateKey {
             state.results.estimates.insert(key, made.clone(), share);
         }
         if let Some(at) = self.place() {
-            if self.stage >= Stage::Cloud && cloud_key(state, at.1) == Ok(Some(self.its_cloud())) {
+            let ahead = !state.is_selected(at.0);
+            if self.stage >= Stage::Cloud && (ahead || cloud_key(state, at.1) == Ok(Some(self.its_cloud()))) {
                 state.results.latest.entry(at).or_default().cloud = Some(self.its_cloud());
             }
-            if self.stage >= Stage::Pose && pose_key(state, at.1) == Ok(Some(self.clone())) {
+            if self.stage >= Stage::Pose && (ahead || pose_key(state, at.1) == Ok(Some(self.clone()))) {
                 state.results.latest.entry(at).or_default().pose = Some(self.clone());
             }
         }
-        if made.has(Stage::Mask) {
-            for (imprint, mask) in self.parts.iter().flatten() {
-                note(state, imprint, mask.as_ref(), made);
-            }
-        }
+        say_masks(state);
+    }
+}
+
+/// Says what masks of the selected pair are made of where that is not what their recipes name; each once.
+pub(crate) fn say_masks(state: &mut State) {
+    let is_here = |key: &EstimateKey| key.parts.iter().flatten().any(|(of, _)| state.is_selected(of.touch().pair));
+    let here = state.results.estimates.iter().filter(|(key, made)| made.has(Stage::Mask) && is_here(key));
+    let here: Vec<_> = here.map(|(key, made)| (key.parts.clone(), made.clone())).collect();
+    for (parts, made) in &here {
+        parts.iter().flatten().for_each(|(imprint, mask)| note(state, imprint, mask.as_ref(), made));
     }
 }
 
@@ -113,7 +120,7 @@ fn note(state: &mut State, imprint: &ImprintKey, mask: Option<&MaskVersion>, mad
     let found = made.contact().masks[touch.finger].as_ref();
     let (Some(why), Some(mask)) = (found.and_then(|found| found.basis.note()), mask) else { return };
     let first = state.results.noted.insert(Request::Estimate(EstimateKey::mask(imprint, mask.clone())));
-    if let Some(entry) = state.library.entry(touch.pair.pair).filter(|_| first && state.is_selected(touch.pair)) {
+    if let Some(entry) = state.library.entry(touch.pair.pair).filter(|_| first) {
         let text = format!("{}, {} finger: {why}", entry.name, state.finger_name(touch.finger));
         state.log.push(Level::Warning, text, None, None);
     }

@@ -73,6 +73,8 @@ pub enum UiRequest {
     Fit,
     /// Bring a pane of the workspace to the front.
     ShowPane(Pane),
+    /// Move the keyboard focus this many panes on.
+    StepPane(isize),
     /// Save a picture of the window.
     Screenshot,
     /// Save a picture of a pane, or copy it.

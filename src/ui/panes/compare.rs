@@ -3,12 +3,12 @@
 use eframe::egui::{self, Align2, Color32, ComboBox, Rect, RichText, Ui, UiBuilder, pos2, vec2};
 use strum::IntoEnumIterator as _;
 
-use super::images::{absent_text, bar, canvas, failed, finger_text, hover, paint_depth, scale_note, window};
+use super::images::{ON_IMAGE, bar, canvas, finger_text, hover, paint_depth, placeholder, scale_note, window};
 use crate::app::keys::ComparisonKey;
 use crate::app::pane::Pane;
 use crate::app::results;
 use crate::app::settings::{CompareChoice, CompareMode, prefer};
-use crate::app::state::Lookup;
+
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{Palette, SMALL};
 use crate::ui::parts::widget::choice::choose;
@@ -17,7 +17,6 @@ use crate::ui::parts::widget::image_canvas::{CanvasOutput, Primary, shows_square
 use crate::ui::parts::widget::line::Line;
 use crate::ui::parts::widget::texture::{Histogram, depth_image};
 use touch2touch_core::colormap::{ColorMap, Range};
-use touch2touch_core::grid::DepthMap;
 use touch2touch_core::rig::{PadId, SensorKind};
 use touch2touch_core::units;
 use touch2touch_pipeline::compare::Comparison;
@@ -145,26 +144,12 @@ fn modes(cx: &mut Cx<'_>, ui: &mut Ui, chosen: &CompareChoice) {
     }
 }
 
-/// Placeholder for a picture.
-fn instead(cx: &mut Cx<'_>, ui: &mut Ui, lookup: Lookup<'_, DepthMap>) {
-    match lookup {
-        Lookup::Failed(err) => failed(cx, ui, err),
-        Lookup::Absent(absent) => absent_text(cx, ui, absent),
-        Lookup::Ready(_) | Lookup::Stale(_) | Lookup::Waiting => {
-            let rect = ui.available_rect_before_wrap();
-            ui.painter().rect_filled(rect, 0.0, cx.p.canvas);
-            let font = egui::FontId::proportional(12.0);
-            ui.painter().text(rect.center(), Align2::CENTER_CENTER, "Computing…", font, cx.p.weak);
-        }
-    }
-}
-
 /// The picture of one of the two.
 fn picture(cx: &mut Cx<'_>, ui: &mut Ui, chosen: &CompareChoice, letter: Letter, finger: PadId) -> Option<Histogram> {
     let subject = letter.of(chosen);
     let lookup = results::subject(cx.state, subject, finger);
     let Some(depth) = lookup.shown() else {
-        instead(cx, ui, lookup);
+        placeholder(cx, ui, (Pane::Compare, finger), lookup, [4, 3]);
         return None;
     };
     let label = format!("Compare {letter:?} {}", cx.state.finger_name(finger));
@@ -175,7 +160,7 @@ fn picture(cx: &mut Cx<'_>, ui: &mut Ui, chosen: &CompareChoice, letter: Letter,
     over(cx, &output, chosen, finger);
     let strong = color(cx.p, chosen, letter);
     output.caption(Align2::LEFT_TOP, &format!("{letter:?}  {}", subject.label()), strong);
-    output.caption(Align2::LEFT_BOTTOM, &finger_text(cx.state, finger), Color32::from_gray(235));
+    output.caption(Align2::LEFT_BOTTOM, &finger_text(cx.state, finger), ON_IMAGE);
     output.caption(Align2::RIGHT_BOTTOM, scale_note(cx.state), crate::ui::parts::theme::DARK.caution);
     histogram
 }
@@ -185,13 +170,13 @@ fn difference(cx: &mut Cx<'_>, ui: &mut Ui, chosen: &CompareChoice, finger: PadI
     for subject in [&chosen.a, &chosen.b] {
         let lookup = results::subject(cx.state, subject, finger);
         if lookup.shown().is_none() {
-            instead(cx, ui, lookup);
+            placeholder(cx, ui, (Pane::Compare, finger), lookup, [4, 3]);
             return None;
         }
     }
     let lookup = results::subjects_compared(cx.state, &chosen.a, &chosen.b, finger);
     let Some(compared) = lookup.shown() else {
-        instead(cx, ui, lookup.map(|compared| &compared.error));
+        placeholder(cx, ui, (Pane::Compare, finger), lookup, [4, 3]);
         return None;
     };
     let label = format!("A minus B {}", cx.state.finger_name(finger));
@@ -207,12 +192,9 @@ fn difference(cx: &mut Cx<'_>, ui: &mut Ui, chosen: &CompareChoice, finger: PadI
     output.paint(picture.texture.id(), Color32::WHITE);
     let histogram = picture.histogram.clone();
     over(cx, &output, chosen, finger);
-    let light = Color32::from_gray(235);
-    // In a narrow pane the corners at the bottom have room for one line.
-    let finger_text = finger_text(cx.state, finger).to_lowercase();
-    let text = format!("{} minus {}, {finger_text}", chosen.a.label(), chosen.b.label());
-    output.caption(Align2::LEFT_TOP, &text, light);
-    output.caption(Align2::RIGHT_TOP, scale_note(cx.state), crate::ui::parts::theme::DARK.caution);
+    output.caption(Align2::LEFT_TOP, &format!("{} minus {}", chosen.a.label(), chosen.b.label()), ON_IMAGE);
+    output.caption(Align2::LEFT_BOTTOM, &finger_text(cx.state, finger), ON_IMAGE);
+    output.caption(Align2::RIGHT_BOTTOM, scale_note(cx.state), crate::ui::parts::theme::DARK.caution);
     histogram
 }
 

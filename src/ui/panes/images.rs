@@ -7,7 +7,7 @@ mod paint;
 use std::hash::Hash;
 use std::sync::Arc;
 
-use eframe::egui::{Align2, Button, Color32, ComboBox, Rect, RichText, Ui, UiBuilder, pos2, vec2};
+use eframe::egui::{Align2, Button, Color32, ComboBox, FontId, Rect, RichText, Ui, UiBuilder, Vec2, pos2, vec2};
 use strum::IntoEnumIterator as _;
 
 use crate::app::action::Action;
@@ -115,13 +115,10 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane
     let mut histogram = None;
     for (i, finger) in fingers.iter().enumerate() {
         let i = i as f32;
-        let rect = if beside {
-            let w = area.width() / n;
-            Rect::from_min_size(area.min + vec2(w * i, 0.0), vec2(w - if n > 1.0 { 1.0 } else { 0.0 }, area.height()))
-        } else {
-            let h = area.height() / n;
-            Rect::from_min_size(area.min + vec2(0.0, h * i), vec2(area.width(), h - if n > 1.0 { 1.0 } else { 0.0 }))
-        };
+        let step = if beside { vec2(area.width() / n, 0.0) } else { vec2(0.0, area.height() / n) };
+        let gap = if n > 1.0 { step.normalized() } else { Vec2::ZERO };
+        let size = if beside { vec2(step.x, area.height()) } else { vec2(area.width(), step.y) };
+        let rect = Rect::from_min_size(area.min + step * i, size - gap);
         let active = n > 1.0 && *finger == cx.state.selection.finger;
         let mut child = ui.new_child(UiBuilder::new().max_rect(rect).id_salt((pane, *finger)));
         child.set_clip_rect(rect.intersect(ui.clip_rect()));
@@ -191,7 +188,13 @@ fn choose_gel(cx: &mut Cx<'_>, ui: &mut Ui) {
 }
 
 /// Placeholder for a picture: the one before, dimmed, while the next is on its way; else a sentence.
-fn placeholder<T: ?Sized>(cx: &mut Cx<'_>, ui: &mut Ui, slot: (Pane, PadId), lookup: Lookup<'_, T>, size: [usize; 2]) {
+pub(crate) fn placeholder<T: ?Sized>(
+    cx: &mut Cx<'_>,
+    ui: &mut Ui,
+    slot: (Pane, PadId),
+    lookup: Lookup<'_, T>,
+    size: [usize; 2],
+) {
     match lookup {
         Lookup::Ready(_) | Lookup::Stale(_) | Lookup::Waiting => {
             let rect = ui.available_rect_before_wrap();
@@ -201,20 +204,12 @@ fn placeholder<T: ?Sized>(cx: &mut Cx<'_>, ui: &mut Ui, slot: (Pane, PadId), loo
                 let view = if gel { cx.shared.views.gel } else { cx.shared.views.bubble };
                 let turned = gel && cx.state.rig().turned();
                 let map = CanvasMap::new(rect, size, view, turned);
-                let uv = if turned {
-                    Rect::from_min_max(pos2(1.0, 1.0), pos2(0.0, 0.0))
-                } else {
-                    Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0))
-                };
+                let [from, to] = if turned { [1.0, 0.0] } else { [0.0, 1.0] };
+                let uv = Rect::from_min_max(pos2(from, from), pos2(to, to));
                 ui.painter_at(rect).image(picture.texture.id(), map.image_rect, uv, Color32::from_gray(110));
             }
-            ui.painter_at(rect).text(
-                rect.center(),
-                Align2::CENTER_CENTER,
-                "Loading…",
-                eframe::egui::FontId::proportional(12.0),
-                cx.p.weak,
-            );
+            let font = FontId::proportional(12.0);
+            ui.painter_at(rect).text(rect.center(), Align2::CENTER_CENTER, "Loading…", font, cx.p.weak);
         }
         Lookup::Failed(err) => failed(cx, ui, err),
         Lookup::Absent(absent) => absent_text(cx, ui, absent),
@@ -271,16 +266,10 @@ pub(crate) fn absent_text(cx: &mut Cx<'_>, ui: &mut Ui, absent: Absent) {
     }
     let what = absent.text();
     let button = absent.action().filter(|a| a.command(cx.state).is_some());
-    let (why, what) = match absent {
-        Absent::NoPrediction if button.is_none() => (
-            match results::can_generate(cx.state) {
-                Err(reason) => reason.text(),
-                Ok(()) => "",
-            },
-            what,
-        ),
-        Absent::NoGenerator => ("Choose a model in Generate, or put one into assets/models.", what),
-        _ => ("", what),
+    let why = match absent {
+        Absent::NoPrediction if button.is_none() => results::can_generate(cx.state).err().map_or("", |why| why.text()),
+        Absent::NoGenerator => "Choose a model in Generate, or put one into assets/models.",
+        _ => "",
     };
     let text = button.map(|a: Action| (a.behind(a.name()), a));
     let shown = text.as_ref().map(|(text, a)| (text.as_str(), a.tooltip()));
@@ -368,15 +357,11 @@ fn gel_image(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, finger: PadId, lookup: Lo
             output.crosshair(px, Color32::WHITE);
         }
     }
-    output.caption(Align2::LEFT_TOP, &finger_text(cx.state, finger), cx.p.strong_on_image());
+    output.caption(Align2::LEFT_TOP, &finger_text(cx.state, finger), ON_IMAGE);
 }
 
-impl Palette {
-    /// Text over pictures: always light, on a dark shade.
-    const fn strong_on_image(&self) -> Color32 {
-        Color32::from_gray(235)
-    }
-}
+/// Text over pictures: always light, on a dark shade.
+pub(crate) const ON_IMAGE: Color32 = Color32::from_gray(235);
 
 /// `right` where the pane could be either finger's.
 pub(crate) fn finger_text(state: &State, finger: PadId) -> String {
@@ -384,7 +369,7 @@ pub(crate) fn finger_text(state: &State, finger: PadId) -> String {
     if let Some(first) = text.get_mut(0..1) {
         first.make_ascii_uppercase();
     }
-    if state.selection.both_fingers && finger == state.selection.finger {
+    if state.fingers().len() > 1 && finger == state.selection.finger {
         text.push_str(", active");
     }
     text
@@ -476,7 +461,7 @@ fn preview_image(cx: &mut Cx<'_>, ui: &mut Ui, finger: PadId, preview: &Arc<Prev
         readout(cx, &output, pane, finger, depth, px);
         hover(cx, finger, px);
     }
-    output.caption(Align2::LEFT_TOP, &finger_text(cx.state, finger), cx.p.strong_on_image());
+    output.caption(Align2::LEFT_TOP, &finger_text(cx.state, finger), ON_IMAGE);
     let text = format!("preview, step {} of {}", preview.picture.step, preview.picture.of);
     output.caption(Align2::RIGHT_TOP, &text, crate::ui::parts::theme::DARK.caution);
     histogram
@@ -492,7 +477,7 @@ pub(crate) fn window(cx: &Cx<'_>, output: &CanvasOutput, finger: PadId) {
 fn captions(cx: &Cx<'_>, output: &CanvasOutput, finger: PadId) {
     let text = finger_text(cx.state, finger);
     output.caption(Align2::LEFT_BOTTOM, &source_note(cx.state), crate::ui::parts::theme::DARK.caution);
-    output.caption(Align2::LEFT_TOP, &text, cx.p.strong_on_image());
+    output.caption(Align2::LEFT_TOP, &text, ON_IMAGE);
 }
 
 /// The value under the pointer, in millimeters.

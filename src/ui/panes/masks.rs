@@ -307,7 +307,10 @@ fn review(cx: &mut Cx<'_>, ui: &mut Ui) {
         ui.spacing_mut().item_spacing.x = 4.0;
         let text = RichText::new(current.name()).color(review_color(cx.p, current));
         ui.add_enabled_ui(editable, |ui| {
-            let combo = egui::ComboBox::from_id_salt("review").width(100.0).selected_text(text).truncate();
+            let combo = egui::ComboBox::from_id_salt("review")
+                .width((ui.available_width() - 110.0).clamp(48.0, 100.0))
+                .selected_text(text)
+                .truncate();
             let (name, said) = (("Review state", "The review state of this pair"), |r: &Review| (r.name(), ""));
             if let Some(review) = choose(ui, combo, name, Some(&current), Review::iter(), said) {
                 cx.push(LabelsCommand::SetReview(review));

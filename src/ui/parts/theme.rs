@@ -97,7 +97,7 @@ pub(crate) const LIGHT: Palette = Palette {
     frame: Color32::from_gray(236),
     panel: Color32::from_gray(247),
     line: Color32::from_gray(208),
-    control: [Color32::from_gray(226), Color32::from_gray(214), Color32::from_gray(200)],
+    control: [Color32::from_gray(214), Color32::from_gray(203), Color32::from_gray(190)],
     text: Color32::from_gray(48),
     strong: Color32::from_gray(12),
     weak: Color32::from_gray(100),

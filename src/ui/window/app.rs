@@ -288,6 +288,7 @@ impl StudioApp {
                 }
             }
             UiRequest::ShowPane(pane) => self.show_pane(pane),
+            UiRequest::StepPane(by) => self.panes.step(ctx, by),
             UiRequest::Screenshot => self.shoot(ctx, None, false),
             UiRequest::PanePicture { pane, copied } => {
                 let place = pane.or(self.panes.hovered).and_then(|pane| self.panes.places.get(&pane).copied());
@@ -403,8 +404,9 @@ impl StudioApp {
     /// Tells the model what is on screen now, and drops a cross-hair that no pane holds any more. `readout` is what the
     /// status bar shows.
     fn after_panes(&mut self, ctx: &egui::Context, readout: Option<&String>, out: &mut Vec<Command>) {
-        if self.panes.drawn != self.state.selection.panes {
-            out.push(Command::View(ViewCommand::ShowPanes(self.panes.drawn.clone())));
+        let drawn = self.panes.drawn.iter().copied().collect();
+        if drawn != self.state.selection.panes {
+            out.push(Command::View(ViewCommand::ShowPanes(drawn)));
         }
         if self.state.selection.hover.is_some() && !self.shared.hover_claimed {
             out.push(Command::View(ViewCommand::HoverPixel(None)));
@@ -560,6 +562,7 @@ impl eframe::App for StudioApp {
             shortcuts::list(&mut cx, &ctx, &mut self.shortcuts);
             unsaved::question(&mut cx, &ctx);
             bars::drop_overlay(&cx, &ctx);
+            pane::ring(&ctx, cx.p);
             if let Some((purpose, path)) = cx.shared.dialogs.show(&ctx) {
                 cx.push(match purpose {
                     Purpose::Folder => Command::Library(LibraryCommand::Open(Place::Path(path))),

@@ -181,7 +181,11 @@ pub(crate) fn bottom(cx: &mut Cx<'_>, ui: &mut Ui) {
 }
 
 fn fingers(cx: &mut Cx<'_>, ui: &mut Ui) {
-    for finger in cx.state.rig().pads() {
+    let felt = cx.state.felt();
+    if felt == [cx.state.selection.finger] {
+        return;
+    }
+    for finger in felt {
         let on = cx.state.selection.finger == finger;
         let name = cx.state.rig().pad_name(finger).to_owned();
         let button = ui.add(egui::Button::selectable(on, RichText::new(&name).size(12.0)).min_size(vec2(44.0, 20.0)));

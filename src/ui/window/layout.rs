@@ -34,7 +34,7 @@ fn shares(workspace: Workspace) -> Shares {
     match workspace {
         Workspace::Inspect => Shares { middle: [0.8, 1.2], bottom: [0.8, 1.2, 1.0], right: [0.8, 1.2], ..shares },
         Workspace::Align => Shares {
-            columns: [0.13, 0.64, 0.23],
+            columns: [0.15, 0.63, 0.22],
             middle: [1.2, 0.8],
             top: [1.45, 1.0, 1.0],
             right: [1.2, 0.8],

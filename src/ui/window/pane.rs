@@ -1,8 +1,8 @@
 //! The docked panes: their memories, title bars, and how they behave in their tree.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
-use eframe::egui::{self, Color32, RichText, Stroke, Ui, WidgetText, vec2};
+use eframe::egui::{self, Color32, RichText, Stroke, Ui, WidgetInfo, WidgetText, vec2};
 use egui_tiles::{Behavior, SimplificationOptions, TabState, Tile, TileId, Tiles, UiResponse};
 
 use crate::app::action::{Action, with_keys};
@@ -12,7 +12,7 @@ use crate::app::results;
 use crate::app::state::{Absent, Lookup, State};
 use crate::ui::parts::cx::{Cx, side_color};
 use crate::ui::parts::made_with;
-use crate::ui::parts::theme::{SMALL, medium, pane_frame};
+use crate::ui::parts::theme::{Palette, SMALL, medium, pane_frame};
 use crate::ui::parts::widget::help;
 
 macro_rules! views {
@@ -42,8 +42,8 @@ pub(crate) struct Panes {
     pub maximized: Option<Pane>,
     /// The pane under the pointer.
     pub hovered: Option<Pane>,
-    /// The panes drawn in this frame, so far.
-    pub drawn: BTreeSet<Pane>,
+    /// The panes drawn in this frame, so far, in order.
+    pub drawn: Vec<Pane>,
     /// Rectangle of each pane when it was drawn last, points.
     pub places: BTreeMap<Pane, egui::Rect>,
     /// True where the pair shown last has no depth camera.
@@ -63,12 +63,42 @@ impl Panes {
         let room = matches!(state.settings.workspace, Workspace::Inspect | Workspace::Label);
         if self.flat && room { &[Pane::Scene] } else { &[] }
     }
+
+    /// Moves the keyboard focus from the pane that has it, or has the control with it, this many panes on.
+    pub(crate) fn step(&self, ctx: &egui::Context, by: isize) {
+        let at = focused(ctx).and_then(|r| self.drawn.iter().position(|p| self.places[p].contains(r.rect.center())));
+        let from = at.map_or(isize::from(by < 0) - 1, |at| at as isize);
+        if let Some(next) = (from + by).checked_rem_euclid(self.drawn.len() as isize) {
+            ctx.memory_mut(|memory| memory.request_focus(stop(self.drawn[next as usize])));
+        }
+    }
+}
+
+/// The widget that has the keyboard focus.
+fn focused(ctx: &egui::Context) -> Option<egui::Response> {
+    ctx.memory(egui::Memory::focused).and_then(|id| ctx.read_response(id))
+}
+
+/// The widget that stands for a whole pane among those that Tab goes through.
+fn stop(pane: Pane) -> egui::Id {
+    egui::Id::unique(("pane", pane))
+}
+
+/// Draws a ring around the widget that has the keyboard focus: one for rows, icons, pictures and panes alike.
+pub(crate) fn ring(ctx: &egui::Context, p: &Palette) {
+    if let Some(focused) = focused(ctx).filter(|focused| focused.interact_rect.is_positive()) {
+        let stroke = Stroke::new(2.0, p.accent);
+        let place = focused.interact_rect.expand(1.0);
+        ctx.layer_painter(focused.layer_id).rect_stroke(place, 3.0, stroke, egui::StrokeKind::Inside);
+    }
 }
 
 /// Draws a pane.
 fn show(cx: &mut Cx<'_>, ui: &mut Ui, panes: &mut Panes, pane: Pane) {
-    panes.drawn.insert(pane);
+    panes.drawn.push(pane);
     panes.places.insert(pane, ui.max_rect());
+    let whole = ui.interact(ui.max_rect(), stop(pane), egui::Sense::focusable_noninteractive());
+    whole.widget_info(|| WidgetInfo::labeled(egui::Role::Pane, true, format!("Pane {}", pane.title())));
     if ui.rect_contains_pointer(ui.max_rect()) {
         panes.hovered = Some(pane);
     }

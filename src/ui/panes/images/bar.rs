@@ -16,7 +16,7 @@ use touch2touch_core::colormap::{ColorMap, Range};
 /// Offer of a smaller range where a picture takes little of the locked one.
 pub(super) fn offer_range(cx: &mut Cx<'_>, ui: &mut Ui, area: Rect, histogram: &Histogram) {
     /// A picture that takes less of the range shows a few of its colors.
-    const LITTLE: f32 = 1.0 / 6.0;
+    const LITTLE: f32 = 1.0 / 3.0;
     let (range, bulk) = (cx.state.settings.range, histogram.bulk());
     let shown = bulk.hi.min(range.max_m) - bulk.lo.max(range.min_m);
     if !range.locked || bulk.hi <= bulk.lo || shown >= LITTLE * (range.max_m - range.min_m) {
@@ -28,7 +28,7 @@ pub(super) fn offer_range(cx: &mut Cx<'_>, ui: &mut Ui, area: Rect, histogram: &
     ui.scope_builder(UiBuilder::new().max_rect(place).id_salt("offer range"), |ui| {
         ui.vertical_centered(|ui| {
             let button = Button::new(RichText::new(text).size(SMALL)).min_size(vec2(0.0, 20.0));
-            let tip = "This pair uses less than a sixth of the color range";
+            let tip = "This pair uses less than a third of the color range";
             if ui.add(button).on_hover_text(tip).clicked() {
                 cx.act(Action::RangeOnce);
             }

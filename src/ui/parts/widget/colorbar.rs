@@ -11,7 +11,7 @@ use touch2touch_core::colormap::{ColorMap, Range};
 /// Height of the whole bar, points.
 pub(crate) const HEIGHT: f32 = 36.0;
 /// Width of the numbers at the ends, points.
-const END: f32 = 42.0;
+const END: f32 = 38.0;
 /// A bar to be shown. Values are in millimeters.
 pub(crate) struct Colorbar<'a> {
     /// The name for screen readers and tests, e.g. `Depth range`.
@@ -51,12 +51,16 @@ impl Colorbar<'_> {
             ui.horizontal_centered(|ui| {
                 let mut edited = range;
                 let lo = end(ui, &mut edited.lo, &format!("{}, lower end", self.label));
-                let width = (ui.available_width() - END - 56.0).max(24.0);
+                // In a narrow pane the colors need the room of the unit.
+                let unit = if ui.available_width() > 150.0 { 26.0 } else { 0.0 };
+                let width = (ui.available_width() - END - 30.0 - unit).max(24.0);
                 if let Some(new) = self.gradient(ui, width, range, p) {
                     asked = Some(ColorbarChange::Range(new));
                 }
                 let hi = end(ui, &mut edited.hi, &format!("{}, upper end", self.label));
-                ui.label(egui::RichText::new("mm").size(SMALL).color(p.weak));
+                if unit > 0.0 {
+                    ui.label(egui::RichText::new("mm").size(SMALL).color(p.weak));
+                }
                 let more = egui::Button::new(egui::RichText::new("…").size(SMALL)).min_size(vec2(18.0, 18.0));
                 let (more, inner) = egui::containers::menu::MenuButton::from_button(more).ui(ui, |ui| self.buttons(ui));
                 let kept = if self.locked == Some(false) { ", now fitted to each pair" } else { "" };

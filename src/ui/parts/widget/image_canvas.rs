@@ -1,5 +1,6 @@
 //! One picture in a pane: pan, zoom and cross-hair, shared with the other pictures of its group.
 
+use eframe::egui::text::{LayoutJob, TextWrapping};
 use eframe::egui::{
     self, Color32, CursorIcon, Key, Painter, PointerButton, Pos2, Rect, Response, Role, Sense, Stroke, TextureId, Ui,
     Vec2, WidgetInfo, pos2, vec2,
@@ -235,7 +236,9 @@ impl CanvasOutput {
             return;
         }
         let rect = self.painter.clip_rect().shrink(6.0);
-        let galley = self.painter.layout_no_wrap(text.to_owned(), egui::FontId::proportional(11.0), color);
+        let mut job = LayoutJob::simple_singleline(text.to_owned(), egui::FontId::proportional(11.0), color);
+        job.wrap = TextWrapping::truncate_at_width(rect.width());
+        let galley = self.painter.layout_job(job);
         let place = corner.align_size_within_rect(galley.size(), rect);
         self.painter.rect_filled(place.expand2(vec2(4.0, 2.0)), 3.0, Color32::from_black_alpha(150));
         self.painter.galley(place.min, galley, color);
