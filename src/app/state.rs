@@ -78,12 +78,12 @@ impl State {
     /// The fingers on screen, the active one first.
     pub fn fingers(&self) -> Vec<PadId> {
         let active = self.selection.finger;
-        let others = self.felt().into_iter().filter(|pad| self.selection.both_fingers && *pad != active);
+        let others = self.fingers_with_data().into_iter().filter(|pad| self.selection.both_fingers && *pad != active);
         std::iter::once(active).chain(others).collect()
     }
 
     /// The fingers that the data have, as far as pairs were read.
-    pub(crate) fn felt(&self) -> Vec<PadId> {
+    pub(crate) fn fingers_with_data(&self) -> Vec<PadId> {
         let samples = &self.results.samples;
         let there = |pad: &PadId| samples.is_empty() || samples.iter().any(|(_, sample)| sample.pad(*pad).is_some());
         self.rig().pads().filter(there).collect()

@@ -138,8 +138,8 @@ pub(crate) fn imprint_of<'a>(state: &'a State, key: &ImprintKey) -> Lookup<'a, D
     match key {
         ImprintKey::Measured(touch) => {
             let sample = state.look(touch.pair).value();
-            let felt = sample.and_then(Absent::NoFinger, |sample| sample.pad(touch.finger));
-            felt.and_then(Absent::NoBubble, |felt| Some(&felt.depth()?.imprint))
+            let touch = sample.and_then(Absent::NoFinger, |sample| sample.pad(touch.finger));
+            touch.and_then(Absent::NoBubble, |touch| Some(&touch.depth()?.imprint))
         }
         ImprintKey::Predicted(recipe, _) => {
             let made = state.look(EstimateKey::imprint(key));

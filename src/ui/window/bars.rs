@@ -181,11 +181,11 @@ pub(crate) fn bottom(cx: &mut Cx<'_>, ui: &mut Ui) {
 }
 
 fn fingers(cx: &mut Cx<'_>, ui: &mut Ui) {
-    let felt = cx.state.felt();
-    if felt == [cx.state.selection.finger] {
+    let fingers = cx.state.fingers_with_data();
+    if fingers == [cx.state.selection.finger] {
         return;
     }
-    for finger in felt {
+    for finger in fingers {
         let on = cx.state.selection.finger == finger;
         let name = cx.state.rig().pad_name(finger).to_owned();
         let button = ui.add(egui::Button::selectable(on, RichText::new(&name).size(12.0)).min_size(vec2(44.0, 20.0)));

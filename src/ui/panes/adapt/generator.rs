@@ -79,7 +79,7 @@ fn refusal(cx: &mut Cx<'_>, ui: &mut Ui, adapted: &Adapted) {
     ui.add_space(8.0);
 }
 
-/// A touch that was left out: what was felt, and what the model draws before and after.
+/// A touch that was left out: the measurement, and what the model draws before and after.
 fn before_and_after(cx: &mut Cx<'_>, ui: &mut Ui) {
     let state = cx.state;
     let Some(held) = learn::held_back(state) else { return };
