@@ -247,9 +247,10 @@ fn method(cx: &mut Cx<'_>, ui: &mut Ui, of: &Row, figures: &TableMetrics, shown:
     };
     name(ui, pair.union(tool), &of.method, color);
     for (column, cell) in shown.iter().zip(numbers) {
-        let unit = if column.metric() == Some(Metric::Verdict) { " % good" } else { "" };
+        let of_verdict = column.metric() == Some(Metric::Verdict);
+        let (unit, decimals) = if of_verdict { (" % good", 0) } else { ("", column.decimals) };
         match figures.get(column) {
-            Some(e) => number(ui, cell, &format!("{:.1$}{unit}", e.value, column.decimals), cx.p.strong),
+            Some(e) => number(ui, cell, &format!("{:.decimals$}{unit}", e.value), cx.p.strong),
             None => number(ui, cell, "–", cx.p.weak),
         }
     }
