@@ -35,7 +35,7 @@ macro_rules! table {
     ($with:ident) => {
         $with! {
         /// The tensors of a pair: about 10 MB of a lab pair (two GelSlim images and their difference, per finger).
-        Sample(PairKey => Sample, Sample::bytes) in samples, 112 * MIB;
+        Sample(PairKey => Sample, Sample::bytes) in samples, 192 * MIB;
         /// The labels stored for a pair: they go to the document.
         Labels(LabelsKey => Read);
         /// The lines about the data set.
@@ -45,7 +45,7 @@ macro_rules! table {
         /// The predictions of a touch that lie on the disk from before.
         Stored(StoredKey => Keyed);
         /// Raw predictions: of the pair on screen, of its other finger, of what is compared.
-        Prediction(PredictionKey => Prediction, |made| made.raw.channels.iter().map(|c| c.len() * 4).sum()) in predictions, 128 * MIB;
+        Prediction(PredictionKey => Prediction, |made| made.raw.channels.iter().map(|c| c.len() * 4).sum()) in predictions, 256 * MIB;
         /// The mean of several predictions of one touch.
         Mean(MeanKey => DepthMap, |mean| mean.len() * 4) in means, 16 * MIB;
         /// A prediction of a color sensor: differences, 0..255 scale.
@@ -67,9 +67,9 @@ macro_rules! table {
         /// The plan of a training of the mask model: what it would learn from.
         TrainPlan(TrainPlanKey => TrainPlan, |plan| (plan.masks() + plan.held_out[0]) * 256) in train_plans, MIB;
         /// An estimate: imprints, masks, cloud and pose as far as a pane needs them.
-        Estimate(EstimateKey => Estimate, Estimate::bytes) in estimates, 128 * MIB;
+        Estimate(EstimateKey => Estimate, Estimate::bytes) in estimates, 259 * MIB;
         /// A registration with everything recorded, ready to be looked through.
-        Run(RunKey => Inspection, Inspection::bytes) in runs, 48 * MIB;
+        Run(RunKey => Inspection, Inspection::bytes) in runs, 96 * MIB;
         /// Reasons, residuals and distances of a recorded registration from the registration's own starts.
         Layers(LayersKey => LayerResult, LayerResult::bytes) in layers, 16 * MIB;
         /// Signed distances between contact points and the registered model.
