@@ -73,7 +73,7 @@ pub fn demands(state: &State) -> Vec<Request> {
     wants.list
 }
 
-/// What the visible panes would lack of the next pair, for when nothing else is to be done: who pages on finds it there.
+/// Results of the next pair that the visible panes would lack, for when nothing else is to be done: who pages on finds them.
 pub(super) fn ahead(state: &mut State) -> Vec<Request> {
     let library = &state.library;
     let row = state.selection.pair.and_then(|pair| library.row_of(pair));

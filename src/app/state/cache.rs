@@ -92,7 +92,7 @@ impl<K: Ord, V> Cache<K, V> {
         self.bytes
     }
 
-    /// Its position, or that where it would be.
+    /// Position of a key, or that where it would be.
     fn find(&self, key: &K) -> Result<usize, usize> {
         self.entries.binary_search_by(|(own, _)| own.cmp(key))
     }

@@ -8,7 +8,6 @@ use crate::app::keys::ComparisonKey;
 use crate::app::pane::Pane;
 use crate::app::results;
 use crate::app::settings::{CompareChoice, CompareMode, prefer};
-
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{Palette, SMALL};
 use crate::ui::parts::widget::choice::choose;

@@ -533,8 +533,8 @@ impl eframe::App for StudioApp {
                 }
                 cx.act(action);
             }
-            if in_hand(state) && !place.covered && !place.dialog {
-                for (axis, steps) in shortcuts::nudges(&ctx) {
+            if in_hand(state) {
+                for (axis, steps) in shortcuts::nudges(&ctx, place) {
                     cx.push(WorkbenchCommand::Nudge(axis, steps * axis.step()));
                 }
             }

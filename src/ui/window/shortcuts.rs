@@ -30,6 +30,13 @@ pub(crate) struct Place {
     pub labeling: bool,
 }
 
+impl Place {
+    /// True where keys are a text's, a menu's, or those of what covers the panes.
+    fn is_typing(self, ctx: &egui::Context) -> bool {
+        self.covered || ctx.egui_wants_keyboard_input() || egui::Popup::is_any_open(ctx)
+    }
+}
+
 /// The actions whose shortcut was pressed in this frame. Keys without Ctrl are a text's while text is being typed.
 ///
 /// The key of an action that is not `possible` now is left to what else wants it (Enter to a focused button).
@@ -38,7 +45,7 @@ pub(crate) fn pressed(ctx: &egui::Context, place: Place, possible: impl Fn(Actio
     if !ctx.input(|input| input.events.iter().any(pressed)) {
         return Vec::new();
     }
-    let typing = place.covered || ctx.egui_wants_keyboard_input() || egui::Popup::is_any_open(ctx);
+    let typing = place.is_typing(ctx);
     let mut actions = Vec::new();
     ctx.input_mut(|input| {
         // The most specific first: Ctrl + Shift + Z is not Ctrl + Z.
@@ -81,8 +88,8 @@ pub(crate) fn pressed(ctx: &egui::Context, place: Place, possible: impl Fn(Actio
 
 /// Moves of the tool in hand that arrow keys ask for: axis and steps. Alt turns; Shift takes ten steps, Ctrl a tenth of one, and
 /// Ctrl + Shift turns by it: many desktops keep Ctrl + Alt for themselves.
-pub(crate) fn nudges(ctx: &egui::Context) -> Vec<(PoseAxis, f64)> {
-    if ctx.egui_wants_keyboard_input() || egui::Popup::is_any_open(ctx) {
+pub(crate) fn nudges(ctx: &egui::Context, place: Place) -> Vec<(PoseAxis, f64)> {
+    if place.dialog || place.is_typing(ctx) {
         return Vec::new();
     }
     let mut asked = Vec::new();
@@ -165,7 +172,7 @@ mod tests {
                 assert_eq!(at(Place { dialog: true, labeling: true, ..Place::default() }), escape, "{s}");
             }
         }
-        assert!(letters >= 15, "{letters} letters are of labeling");
+        assert!(letters >= 18, "{letters} letters are of labeling");
         for action in [Action::AdoptAutomatic, Action::FillHoles, Action::ResetMask, Action::Flag] {
             assert!(action.is_of_labeling(), "{action:?}");
         }
