@@ -88,8 +88,8 @@ pub(super) struct RegistrationArgs {
     /// The registration. `distance_field` may be followed by `:gate=MM`, beyond which points are ignored.
     #[arg(long = "engine", value_name = "ENGINE", default_value = Registration::default().key(), value_parser = registrations())]
     chosen: Registrations,
-    /// Poses of the tool in the hand among which `joint` looks for it: up to so many degrees and millimeters from 0, or `free`
-    /// (default: 22.5,5, the lab's grasps).
+    /// Poses of the tool in the hand among which `joint` looks for it: `free` (default), `lab` (22.5,5), or up to so many degrees
+    /// and millimeters from 0.
     #[arg(long, value_name = "DEG,MM")]
     range: Option<Range>,
 }

@@ -366,7 +366,7 @@ pub(super) fn run(args: &GraspsArgs) -> VerbResult {
                 truth_mm: [truth.y_m * 1e3, truth.z_m * 1e3],
                 turns: Symmetry::of(&tools.models[tool]).turns.len(),
                 free: found(&held, Range::FREE, &tools),
-                labs_range: found(&held, Range::default(), &tools),
+                labs_range: found(&held, Range::LAB, &tools),
             });
         }
     }

@@ -122,7 +122,7 @@ impl Prior {
 }
 
 /// Poses among which a tool is looked for, as a [`Prior`] of whole numbers: the same in a key, in a text and in the arithmetic.
-/// As text `DEGREES,MM`. No smaller than the default, which is the prior of all registrations.
+/// As text `DEGREES,MM`, `free` or `lab`. No smaller than the lab's, which is the prior of all registrations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct Range {
     millidegrees: u32,
@@ -130,13 +130,15 @@ pub struct Range {
 }
 
 impl Default for Range {
-    /// The grid of the lab's grasps.
+    /// Any pose.
     fn default() -> Self {
-        Self { millidegrees: 22_500, micrometers: 5_000 }
+        Self::FREE
     }
 }
 
 impl Range {
+    /// The grid of the lab's grasps.
+    pub const LAB: Self = Self { millidegrees: 22_500, micrometers: 5_000 };
     /// A full turn, and farther than any tool reaches.
     pub const FREE: Self = Self { millidegrees: 180_000, micrometers: 1_000_000 };
 
@@ -163,10 +165,12 @@ impl std::str::FromStr for Range {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        if text == "free" {
-            return Ok(Self::FREE);
+        match text {
+            "free" => return Ok(Self::FREE),
+            "lab" => return Ok(Self::LAB),
+            _ => {}
         }
-        let ([least_deg, least_mm], [most_deg, most_mm]) = (Self::default().lengths(), Self::FREE.lengths());
+        let ([least_deg, least_mm], [most_deg, most_mm]) = (Self::LAB.lengths(), Self::FREE.lengths());
         let number = |text: &str, within: std::ops::RangeInclusive<f64>| {
             let value = text.trim().parse().ok().filter(|value| within.contains(value));
             value.map(|value: f64| (value * 1e3).round() as u32)
@@ -176,7 +180,7 @@ impl std::str::FromStr for Range {
             .and_then(|(turn, shift)| Some((number(turn, least_deg..=most_deg)?, number(shift, least_mm..=most_mm)?)));
         let (millidegrees, micrometers) = parts.ok_or_else(|| {
             format!(
-                "{text:?}: `free`, or {least_deg} to {most_deg} degrees and {least_mm} to {most_mm} mm are needed, as in 180,40"
+                "{text:?}: `free`, `lab`, or {least_deg} to {most_deg} degrees and {least_mm} to {most_mm} mm are needed, as in 180,40"
             )
         })?;
         Ok(Self { millidegrees, micrometers })
@@ -449,7 +453,7 @@ impl AlignReport {
             evidence: None,
             answers: Vec::new(),
             ends: Vec::new(),
-            range: Range::default(),
+            range: Range::LAB,
             trace: Vec::new(),
             fits: Vec::new(),
             runs,

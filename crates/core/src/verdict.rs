@@ -3,7 +3,7 @@
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-use crate::align::{self, AlignReport, Basis, Evidence, PLACE_OPEN_M, Range};
+use crate::align::{self, AlignReport, Basis, Evidence, PLACE_OPEN_M, Prior};
 use crate::manual::PoseDifference;
 use crate::units;
 
@@ -95,12 +95,11 @@ const OFF: Limits = [0.5, f64::INFINITY];
 /// Standard deviation of the place where it is known least, meters.
 const PLACE_SD_M: Limits = [PLACE_OPEN_M, f64::INFINITY];
 
-/// Limits of one minus likeness plus these shares of what else speaks against a tool, each by its weight, where it was looked for
-/// among all poses: any tool then fits somewhere, and no one sign tells it. From other tools at fresh grasps.
-const ANYWHERE: Limits = [0.55, 0.75];
+/// Limits of one minus likeness plus these shares of what else speaks against a tool, each by its weight, of a pose beyond the
+/// lab's grasps: among all poses any tool fits somewhere, and no one sign tells it. From other tools at fresh grasps.
+const ANYWHERE: Limits = [0.44, 0.8];
 const ANYWHERE_OFF: f64 = 1.5;
 const ANYWHERE_ELSEWHERE: f64 = 2.0;
-const ANYWHERE_SWAPPED: f64 = 0.5;
 /// Chance of the answer below which another one is told.
 const LIKELIEST: f64 = 0.5;
 
@@ -119,8 +118,8 @@ pub struct Verdict {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SignKind {
-    /// The gripper cannot hold it so.
-    NotHeld,
+    /// It lies outside the range that was searched.
+    Beyond,
     /// Another pose is likelier.
     Several,
     /// The imprints fit better with the fingers swapped.
@@ -190,12 +189,12 @@ fn fits(evidence: &Evidence) -> String {
 }
 
 fn signs(report: &AlignReport, evidence: &Evidence, place_m: f64) -> Vec<Sign> {
-    use SignKind::{AngleOpen, Elsewhere, Fingers, MaskAlone, Misfit, NotHeld, OffTool, PlaceOpen, Several, Swapped};
+    use SignKind::{AngleOpen, Beyond, Elsewhere, Fingers, MaskAlone, Misfit, OffTool, PlaceOpen, Several, Swapped};
     let mut signs = Vec::new();
     let mut sign = |kind, grade, what| signs.push(Sign { kind, grade, what });
     if !report.within_prior {
         let [degrees, shift_mm] = report.range.lengths();
-        sign(NotHeld, Grade::Wrong, format!("the gripper cannot hold it so (±{degrees}°, ±{shift_mm} mm)"));
+        sign(Beyond, Grade::Check, format!("the pose lies outside the search range (±{degrees}°, ±{shift_mm} mm)"));
     }
     let own: f64 = report.answers.iter().filter(|answer| answer.alike).map(|answer| answer.weight).sum();
     if let Some(other) = report.answers.iter().find(|answer| !answer.alike).filter(|_| own < LIKELIEST) {
@@ -227,9 +226,8 @@ fn signs(report: &AlignReport, evidence: &Evidence, place_m: f64) -> Vec<Sign> {
         let what = format!("the membranes fit better {} away: check the mask", way(membrane.own));
         sign(Elsewhere, Grade::of(membrane.own.gain, limits.elsewhere), what);
         let (unlike, off_tool) = (1.0 - membrane.likeness, off.min(OFF_CAP));
-        let grade = if report.range != Range::default() && report.joint.is_some_and(|fit| fit.basis.has_membrane()) {
-            let others = ANYWHERE_ELSEWHERE * membrane.own.gain + ANYWHERE_SWAPPED * membrane.swapped.unwrap_or(0.0);
-            Grade::of(unlike + ANYWHERE_OFF * off_tool + others, ANYWHERE)
+        let grade = if !Prior::default().allows(report.grasp_from_object) {
+            Grade::of(unlike + ANYWHERE_OFF * off_tool + ANYWHERE_ELSEWHERE * membrane.own.gain, ANYWHERE)
         } else {
             Grade::of(unlike + OFF_COUNTS * off_tool, limits.misfit)
         };

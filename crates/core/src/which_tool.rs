@@ -1,12 +1,12 @@
 //! [`which_tool`]: the tool of a touch among several, by what each of them explains of contact and membranes.
 
-use crate::align::{AlignReport, Ask, Contacts, Register};
+use crate::align::{AlignReport, Ask, Contacts, Prior, Register};
 use crate::pose::register_with;
 use crate::tool::ToolModel;
 use crate::verdict::{Grade, Verdict};
 
-/// Penalty of a pose in which no gripper holds a tool: more than any likeness makes up for.
-const NOT_HELD: f64 = 5.0;
+/// Penalty of a pose outside the lab's grasps: among all poses most tools fit somewhere.
+const BEYOND: f64 = 0.2;
 /// Difference of two costs at which the cheaper tool is taken for `e` times as likely. From fresh grasps under two laws, on
 /// which the right tool was ahead of the next one by 0.1 to 2.
 const TELLING: f64 = 0.1;
@@ -39,10 +39,10 @@ pub fn which_tool<'t>(
         let report = register_with(registration, contacts, model, ask).ok()?;
         let evidence = report.evidence?;
         let misfit = evidence.membrane.map_or(1.0, |membrane| membrane.misfit.max(1e-9));
-        let held = if report.within_prior { 0.0 } else { NOT_HELD };
+        let beyond = if Prior::default().allows(report.grasp_from_object) { 0.0 } else { BEYOND };
         Some(Candidate {
             tool: tool.to_owned(),
-            cost: misfit.ln() + 1.0 - evidence.on_tool + held,
+            cost: misfit.ln() + 1.0 - evidence.on_tool + beyond,
             report,
             chance: 0.0,
         })

@@ -24,7 +24,7 @@ mod turned;
 use serde::{Deserialize, Serialize};
 
 use super::register::check_overlap;
-use super::{AlignConfig, AlignError, AlignReport, Ask, Prior, Range, Register, Scene};
+use super::{AlignConfig, AlignError, AlignReport, Ask, Prior, Range, Register, Rung, Scene};
 use crate::frames::PlanarPose;
 use crate::tool::ToolModel;
 pub use answers::PoseAnswer;
@@ -37,11 +37,13 @@ const DOUBTFUL: f64 = 0.3;
 const EXPLAINED: f64 = 0.05;
 /// The same of a predicted one.
 const PREDICTED_EXPLAINED: f64 = 0.5;
+/// Share of the mask's points on the silhouette from which on a pose that it gives at once is not looked for elsewhere.
+const MASK_STANDS: f64 = 0.9;
 
 /// The registration by membrane and mask. The default is what the product uses.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct JointConfig {
-    /// Poses among which the tool is looked for where the prior does not have it; not beyond that one unless wider.
+    /// Poses among which the tool is looked for where its pose in the prior does not stand.
     pub range: Range,
 }
 
@@ -101,52 +103,71 @@ impl JointFit {
 impl JointConfig {
     /// True for a pose in the prior or in the range.
     fn allows(self, pose: PlanarPose) -> bool {
-        Prior::default().allows(pose) || self.is_wider() && self.range.prior().allows(pose)
+        Prior::default().allows(pose) || self.range.prior().allows(pose)
     }
 
-    /// True where poses beyond the prior may be looked for.
-    fn is_wider(self) -> bool {
-        self.range != Range::default()
+    /// The answer in the prior, and whether it stands: then nobody looks farther. Where the mask alone answers, it goes up these
+    /// rungs.
+    fn in_prior(self, scene: &Scene<'_>, tool: &ToolModel, ask: Ask<'_>, rungs: &[Rung]) -> (Found, bool) {
+        let by_mask = |fit: JointFit| -> Found {
+            let report = AlignConfig { rungs: rungs.to_vec(), ..AlignConfig::default() }.run(scene, tool, ask)?;
+            let within_prior = report.within_prior || self.allows(report.grasp_from_object);
+            Ok(AlignReport { joint: Some(fit), range: self.range, within_prior, ..report })
+        };
+        let stood = |found: Found| {
+            let sure = |at: &AlignReport| at.rung == Rung::Single && at.inlier_share >= MASK_STANDS;
+            let stands = found.as_ref().is_ok_and(sure);
+            (found, stands)
+        };
+        if scene.images().is_empty() {
+            return (by_mask(JointFit::by_mask(Basis::NoImage)), true);
+        }
+        let mut problem = match Problem::new(scene, tool, self, ask, false) {
+            Ok(Some(problem)) => problem,
+            Ok(None) => return (by_mask(JointFit::by_mask(Basis::NoZone)), false),
+            Err(error) => return (Err(error), true),
+        };
+        if let Some(starts) = ask.starts {
+            // Asked is where these lead, not what else would answer.
+            let finite = scene.yz().iter().copied().filter(|p| p.is_finite());
+            let overlap = finite.clone().next().map_or(Ok(()), |_| check_overlap(finite, &tool.field, starts));
+            return (overlap.map(|()| problem.report(scene.yz(), problem.solve())), true);
+        }
+        let mut answer = problem.solve();
+        if problem.predicted && answer.fit.explained < PREDICTED_EXPLAINED {
+            return stood(by_mask(JointFit { basis: Basis::Unlike, mask_weight: 1.0, ..answer.fit }));
+        }
+        if answer.fit.explained < DOUBTFUL {
+            // A bad mask can lead all scouts away from what the membrane shows plainly.
+            answer = problem.solve_without_mask(&answer, EXPLAINED).unwrap_or(answer);
+        }
+        if answer.fit.explained < EXPLAINED {
+            return stood(by_mask(JointFit { basis: Basis::LittleContact, mask_weight: 1.0, ..answer.fit }));
+        }
+        let stands = problem.stands(&answer);
+        (Ok(problem.report(scene.yz(), answer)), stands)
     }
 }
+
+/// A pose, or why there is none.
+type Found = Result<AlignReport, AlignError>;
 
 impl Register for JointConfig {
     fn run(&self, scene: &Scene<'_>, tool: &ToolModel, ask: Ask<'_>) -> Result<AlignReport, AlignError> {
         if ask.starts.is_some_and(|starts| starts.is_empty() || starts.iter().any(|s| !s.is_finite())) {
             return Err(AlignError::Config { what: "starts" });
         }
-        let by_mask_from = |fit: JointFit, starts: &[PlanarPose]| -> Result<AlignReport, AlignError> {
-            let report = AlignConfig { starts: starts.to_vec(), ..AlignConfig::default() }.run(scene, tool, ask)?;
-            let within_prior = report.within_prior || self.allows(report.grasp_from_object);
-            Ok(AlignReport { joint: Some(fit), range: self.range, within_prior, ..report })
-        };
-        let by_mask = |fit: JointFit| by_mask_from(fit, &[]);
-        if scene.images().is_empty() {
-            return by_mask(JointFit::by_mask(Basis::NoImage));
+        let all = AlignConfig::default().rungs;
+        // The mask's grid and proof take longer than a look around, which mostly leaves nothing to do for them.
+        let quick: &[Rung] = if self.range == Range::LAB || scene.images().is_empty() { &all } else { &all[..2] };
+        let (mut found, stands) = self.in_prior(scene, tool, ask, quick);
+        if stands || self.range == Range::LAB {
+            return found;
         }
-        let Some(mut problem) = Problem::new(scene, tool, *self, ask)? else {
-            return by_mask(JointFit::by_mask(Basis::NoZone));
-        };
-        if let Some(starts) = ask.starts {
-            // Asked is where these lead, not what else would answer.
-            let finite = scene.yz().iter().copied().filter(|p| p.is_finite());
-            if finite.clone().next().is_some() {
-                check_overlap(finite, &tool.field, starts)?;
-            }
-            return Ok(problem.report(scene.yz(), problem.solve(false)));
+        if let Some(problem) = Problem::new(scene, tool, *self, ask, true)? {
+            found = problem.look_around(scene.yz(), found);
         }
-        let mut answer = problem.solve(self.is_wider());
-        if problem.predicted && answer.fit.explained < PREDICTED_EXPLAINED {
-            let fit = JointFit { basis: Basis::Unlike, mask_weight: 1.0, ..answer.fit };
-            return by_mask_from(fit, &problem.start_around(&answer));
-        }
-        if answer.fit.explained < DOUBTFUL && !self.is_wider() {
-            // A bad mask can lead all scouts away from what the membrane shows plainly.
-            answer = problem.solve_without_mask(&answer, EXPLAINED).unwrap_or(answer);
-        }
-        if answer.fit.explained < EXPLAINED && !self.is_wider() {
-            return by_mask(JointFit { basis: Basis::LittleContact, mask_weight: 1.0, ..answer.fit });
-        }
-        Ok(problem.report(scene.yz(), answer))
+        let by_mask = |report: &AlignReport| report.joint.is_some_and(|fit| !fit.basis.has_membrane());
+        if found.as_ref().map_or(true, by_mask) { self.in_prior(scene, tool, ask, &all).0 } else { found }
     }
 }

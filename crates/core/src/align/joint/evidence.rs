@@ -98,7 +98,9 @@ impl Evidence {
             .filter(|&&i| tool.field.sample(object_from_grasp.transform_yz(*finite[i])).distance <= ON_TOOL_M);
         let on_tool = on.count() as f64 / chosen.len().max(1) as f64;
         let config = JointConfig { range: report.range };
-        let problem = Problem::new(scene, tool, config, Ask::default()).ok().flatten();
+        // In the prior as its ladder looks at it, unless other poses are to be compared with it.
+        let wide = !report.ends.is_empty() || !Prior::default().allows(pose);
+        let problem = Problem::new(scene, tool, config, Ask::default(), wide).ok().flatten();
         let found = problem.as_ref().map(|problem| problem.evidence(scene, State::from_pose(pose, problem.centroid())));
         let by_membrane = report.joint.is_some_and(|fit| fit.basis.has_membrane());
         let uncertainty = match (&problem, found) {
@@ -110,7 +112,7 @@ impl Evidence {
         };
         let membrane = found.map(|(evidence, _)| evidence);
         let answers = match &problem {
-            _ if report.range == Range::default() => Vec::new(),
+            _ if report.range == Range::LAB => Vec::new(),
             Some(problem) if by_membrane => problem.answers(report, &Symmetry::of(tool)),
             _ => shared(vec![(pose, 1.0)], &Symmetry::of(tool), report.range),
         };
@@ -157,9 +159,13 @@ impl Problem<'_> {
         }
         let images = [PadImage { camera: a.camera, ..*b }, PadImage { camera: b.camera, ..*a }];
         let scene = Scene::new(Contacts { points: &[], images: &images });
-        let swapped = Problem::new(&scene, self.tool, self.config, Ask::default()).ok()??;
         let beyond = !Prior::default().allows(at.to_pose(self.centroid()));
-        let end = swapped.solve(beyond && self.config.is_wider()).end();
+        let swapped = Problem::new(&scene, self.tool, self.config, Ask::default(), beyond).ok()??;
+        let mut found = Ok(swapped.report(&[], swapped.solve()));
+        if beyond {
+            found = swapped.look_around(&[], found);
+        }
+        let end = State::from_pose(found.ok()?.grasp_from_object, swapped.centroid());
         Some(Relief::of(&swapped.patches_at(LOOK.band, LOOK.places, end), end, LOOK.kernel_m).misfit())
     }
 }

@@ -11,7 +11,7 @@ use super::image::Image;
 use super::smooth::BANDS;
 use super::template::{BandField, Grasp, Template, grasp_of, template};
 use super::turned::{Frame, Turned, turned};
-use super::{Basis, JointConfig, JointFit, PREDICTED_EXPLAINED};
+use super::{Basis, EXPLAINED, JointConfig, JointFit, PREDICTED_EXPLAINED};
 use crate::align::batch::{Cloud, State};
 use crate::align::observability::of_cloud;
 use crate::align::planar::fits;
@@ -51,8 +51,9 @@ const AGREES: f64 = 0.1;
 /// Costs this close, as a share, do not tell two ends apart.
 const CLOSE: f64 = 0.15;
 /// Share of the membrane's relief that an answer from the prior must explain, or scouts start all around: of a membrane that
-/// hangs from the tool, and of one that reaches the middle plane.
-const STANDS: [f64; 2] = [0.33, 0.4];
+/// hangs from the tool, and of one that reaches the middle plane. Little, because an answer on which the first scouts agree
+/// is hardly ever another pose's.
+const STANDS: [f64; 2] = [0.2, EXPLAINED];
 /// Share of its cost that another pose must be ahead of it.
 const AHEAD: f64 = 0.03;
 /// Most steps in each band.
@@ -97,6 +98,8 @@ pub(super) struct Problem<'a> {
     free: FreeShape,
     /// True where a model predicted the images.
     pub(super) predicted: bool,
+    /// True where the tool is looked for beyond the prior.
+    wide: bool,
 }
 
 /// Outcome of a search: its starts and their runs.
@@ -109,15 +112,8 @@ pub(super) struct Answer {
     pub(super) lookups: usize,
     trace: Vec<TraceStep>,
     points: usize,
-    /// Ends that were refined alike after scouts had started all around.
-    ends: Vec<Progress>,
-}
-
-impl Answer {
-    /// State of the answer.
-    pub(super) fn end(&self) -> State {
-        self.runs[self.winner].state
-    }
+    /// True where scouts met in the best end, in the prior, and none nearly as good lies elsewhere.
+    settled: bool,
 }
 
 /// Descents with what they cost and left behind.
@@ -168,6 +164,10 @@ impl Descents<'_, '_> {
         (relief.explained(), noise_m(relief.residuals_m))
     }
 
+    fn points(&self) -> usize {
+        self.patches[LAST].iter().map(|(_, patch)| patch.len()).sum()
+    }
+
     /// Through the bands from one start, until it meets the end of a run before.
     fn scout(&mut self, runs: &[Progress], at: &mut Progress, from: usize) {
         for stage in from..LAST {
@@ -194,11 +194,11 @@ impl<'a> Problem<'a> {
         tool: &'a ToolModel,
         config: JointConfig,
         ask: Ask<'a>,
+        wide: bool,
     ) -> Result<Option<Self>, AlignError> {
         let finite = tool.mesh.vertices.iter().filter(|v| v.is_finite());
         let tops = finite.fold([0f64; 2], |[low, high], v| [low.max(-v.x), high.max(v.x)]);
-        let images: Vec<Image> =
-            scene.images().iter().filter_map(|image| Image::new(image, tops, config.is_wider())).collect();
+        let images: Vec<Image> = scene.images().iter().filter_map(|image| Image::new(image, tops, wide)).collect();
         let area: f64 = images.iter().map(Image::area_m2).sum();
         if area < MIN_AREA_M2 {
             return Ok(None);
@@ -236,7 +236,7 @@ impl<'a> Problem<'a> {
             })
         });
         let predicted = scene.images().iter().any(|image| image.predicted);
-        Ok(Some(Self { tool, config, ask, fingers, centroid, mask, not_finite, predicted, free }))
+        Ok(Some(Self { tool, config, ask, fingers, centroid, mask, not_finite, predicted, free, wide }))
     }
 
     /// The point about which everything turns, `(y, z)`, meters.
@@ -248,7 +248,7 @@ impl<'a> Problem<'a> {
     /// it leaves the mask out from then on.
     pub(super) fn solve_without_mask(&mut self, answer: &Answer, gain: f64) -> Option<Answer> {
         let mask = self.mask.take()?;
-        let alone = self.solve(false);
+        let alone = self.solve();
         if alone.fit.explained > answer.fit.explained + gain {
             return Some(alone);
         }
@@ -301,7 +301,7 @@ impl<'a> Problem<'a> {
     /// The grasp of a state, or that of the lab's where it is one; by its turn alone where the place is not asked for.
     pub(super) fn grasp(&self, at: State, place: bool) -> Grasp {
         let pose = at.to_pose(self.centroid);
-        if Prior::default().allows(pose) || !self.config.is_wider() {
+        if Prior::default().allows(pose) || !self.wide {
             return Grasp::default();
         }
         let [turn, y, z] = grasp_of(pose);
@@ -328,8 +328,8 @@ impl<'a> Problem<'a> {
 
     /// Two scouts from the middle of the prior, one by the bands and one by the mask; two more, and two more, while the best
     /// is alone, has a rival of nearly its cost elsewhere, or lies where no gripper holds a tool. Then the best two are
-    /// refined. Where that answer does not stand, scouts may start all around.
-    pub(super) fn solve(&self, around: bool) -> Answer {
+    /// refined.
+    pub(super) fn solve(&self) -> Answer {
         let own = self.ask.starts.is_none();
         let mut starts = self.ask.starts.map_or_else(|| vec![PlanarPose::default()], <[_]>::to_vec);
         let mut descents = self.descents();
@@ -360,8 +360,7 @@ impl<'a> Problem<'a> {
                 settled = true;
                 break order;
             }
-            // What the middle of the prior does not settle, scouts all around do.
-            let Some(shares) = more.next().filter(|_| !around) else { break order };
+            let Some(shares) = more.next() else { break order };
             rung = Rung::Several;
             let theta_rad = Prior::default().theta_rad;
             starts.extend(shares.map(|share| PlanarPose { theta_rad: share * theta_rad, ..PlanarPose::default() }));
@@ -369,58 +368,71 @@ impl<'a> Problem<'a> {
         let best = runs[order[0]];
         let (explained, noise_m) = descents.told(best.state);
         let mask_weight = self.mask_weight(noise_m, best.state);
-        let stands = if self.predicted { PREDICTED_EXPLAINED } else { STANDS[usize::from(self.free.reaches)] };
-        let look_around = around && own && !(settled && explained >= stands);
-        let winner = if look_around { order[0] } else { self.refine(&mut runs, &order, &mut descents, mask_weight) };
-        let fit = JointFit {
+        let winner = self.refine(&mut runs, &order, &mut descents, mask_weight);
+        let fit = self.fit(noise_m, mask_weight, explained);
+        let points = descents.points();
+        Answer { starts, runs, winner, rung, fit, lookups: descents.lookups, trace: descents.trace, points, settled }
+    }
+
+    fn fit(&self, noise_m: f64, mask_weight: f64, explained: f64) -> JointFit {
+        JointFit {
             basis: if self.mask.is_some() { Basis::Both } else { Basis::Membrane },
             noise_m,
             mask_weight,
             area_m2: self.fingers.iter().map(|finger| finger.image.area_m2()).sum(),
             explained,
-        };
-        let points = descents.patches[LAST].iter().map(|(_, patch)| patch.len()).sum();
-        let mut answer =
-            Answer { starts, runs, winner, rung, fit, lookups: 0, trace: Vec::new(), points, ends: Vec::new() };
-        if look_around {
-            self.look_around(&mut answer, &mut descents);
         }
-        Answer { lookups: descents.lookups, trace: descents.trace, ..answer }
     }
 
-    /// Pose that the scouts all around found, for the mask to start from; none where the answer is not theirs.
-    pub(super) fn start_around(&self, answer: &Answer) -> Vec<PlanarPose> {
-        let end = answer.end().to_pose(self.centroid);
-        (answer.rung == Rung::Around).then_some(end).into_iter().collect()
+    /// True where the first scouts agree on an answer in the prior that explains enough, so that nobody looks elsewhere.
+    pub(super) fn stands(&self, answer: &Answer) -> bool {
+        let least = if self.predicted { PREDICTED_EXPLAINED } else { STANDS[usize::from(self.free.reaches)] };
+        answer.settled && answer.rung == Rung::Single && self.mask.is_some() && answer.fit.explained >= least
     }
 
-    /// Scouts all around; a pose that they find is the answer if it is cheaper by a margin than the one at hand.
-    fn look_around(&self, answer: &mut Answer, descents: &mut Descents<'_, '_>) {
+    /// Scouts all around; a pose that they find is the answer if it is cheaper by a margin than the one in the prior.
+    pub(super) fn look_around(
+        &self,
+        points_yz: &[DVec2],
+        at_hand: Result<AlignReport, AlignError>,
+    ) -> Result<AlignReport, AlignError> {
+        let mut descents = self.descents();
         descents.around = true;
         descents.patches[0] = self.patches_of(0, PLACES_AROUND);
-        let mut ends = self.anywhere(descents, ENDS);
-        let at_hand = answer.end();
-        let likeliest = ends.first().map_or(at_hand, |(_, best)| best.state);
+        let (mut starts, mut runs): (Vec<State>, Vec<Progress>) =
+            self.anywhere(&mut descents, ENDS).into_iter().unzip();
+        descents.trace.clear();
+        let Some(likeliest) = runs.first().map(|best| best.state) else { return at_hand };
         let weight = self.mask_weight(descents.told(likeliest).1, likeliest);
-        ends.push((at_hand, Progress::new(at_hand)));
-        let run = answer.runs.len();
-        for (_, at) in &mut ends {
-            self.settle(descents, run, at, weight);
+        let known = at_hand.as_ref().ok().map(|report| State::from_pose(report.grasp_from_object, self.centroid));
+        starts.extend(known);
+        runs.extend(known.map(Progress::new));
+        for (run, at) in runs.iter_mut().enumerate() {
+            self.settle(&mut descents, run, at, weight);
         }
-        let (_, first) = ends[ends.len() - 1];
-        let margin = if self.allowed(&first) { AHEAD } else { 0.0 };
-        ends.retain(|(_, at)| self.config.allows(at.state.to_pose(self.centroid)));
-        ends.sort_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
-        answer.ends = ends.iter().map(|(_, at)| *at).collect();
-        let found = ends.first().filter(|(_, best)| best.cost < first.cost * (1.0 - margin));
-        let (start, mut best) = found.copied().unwrap_or((at_hand, first));
-        self.settle(descents, run, &mut best, weight);
-        let (explained, noise_m) = descents.told(best.state);
-        answer.fit = JointFit { noise_m, mask_weight: weight, explained, ..answer.fit };
-        answer.rung = if self.allowed(&best) { answer.rung } else { Rung::Around };
-        answer.winner = run;
-        answer.runs.push(best);
-        answer.starts.push(start.to_pose(self.centroid));
+        let margin = |first: &Progress| if self.allowed(first) { AHEAD } else { 0.0 };
+        let limit =
+            known.map_or(f64::INFINITY, |_| runs.last().map_or(0.0, |first| first.cost * (1.0 - margin(first))));
+        let found = (0..runs.len()).filter(|run| self.config.allows(runs[*run].state.to_pose(self.centroid)));
+        let winner = found.min_by(|a, b| runs[*a].cost.total_cmp(&runs[*b].cost)).filter(|run| runs[*run].cost < limit);
+        let told = winner.map(|run| descents.told(runs[run].state));
+        let least = if self.predicted { PREDICTED_EXPLAINED } else { EXPLAINED };
+        let (Some(winner), Some((explained, noise_m))) = (winner, told.filter(|(explained, _)| *explained >= least))
+        else {
+            return at_hand.map(|report| AlignReport { ends: self.ends(&runs), ..report });
+        };
+        let fit = self.fit(noise_m, weight, explained);
+        let (starts, points) = (starts.iter().map(|at| at.to_pose(self.centroid)).collect(), descents.points());
+        let (lookups, trace) = (descents.lookups, descents.trace);
+        let ends = self.ends(&runs);
+        let answer = Answer { starts, runs, winner, rung: Rung::Around, fit, lookups, trace, points, settled: false };
+        Ok(AlignReport { ends, ..self.report(points_yz, answer) })
+    }
+
+    /// Ends with their costs, those alone that the range allows.
+    fn ends(&self, runs: &[Progress]) -> Vec<(PlanarPose, f64)> {
+        let ends = runs.iter().map(|at| (at.state.to_pose(self.centroid), at.cost));
+        ends.filter(|(pose, _)| self.config.allows(*pose)).collect()
     }
 
     /// The last descent, again with the template of where it ended until that is the same.
@@ -505,7 +517,6 @@ impl<'a> Problem<'a> {
             within_prior: self.config.allows(pose),
             observability: seen,
             joint: Some(answer.fit),
-            ends: answer.ends.iter().map(|at| (at.state.to_pose(self.centroid), at.cost)).collect(),
             range: self.config.range,
             trace: answer.trace,
             fits,

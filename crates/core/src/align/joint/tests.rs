@@ -107,7 +107,7 @@ fn where_the_membrane_says_nothing_the_mask_answers_bit_for_bit_and_it_is_said()
         let contacts = Contacts { points: &touch.points(), images };
         let found = JointConfig::default().run(&Scene::new(contacts), &touch.tool, Ask::default()).unwrap();
         assert_eq!(found.joint.unwrap().basis, basis);
-        assert_eq!(AlignReport { joint: None, ..found }, by_mask);
+        assert_eq!(AlignReport { joint: None, range: by_mask.range, ..found }, by_mask);
     };
     same(&touch, &[], Basis::NoImage);
     let nothing = DepthMap::filled(175, 140, f32::NAN);
@@ -182,7 +182,7 @@ fn the_verdict_tells_another_tool_a_blank_finger_and_swapped_ones_without_truth(
         assert_eq!(good.grade, Grade::Good, "{good:?} {:?}", right.evidence);
         assert!(good.against.is_empty() && good.why.contains("the tool's shape"), "{good:?}");
         let (_, wrong) = judged(&touch, &ToolModel::new(tools()[other].mesh()).unwrap());
-        assert_eq!(wrong.grade, Grade::Wrong, "{wrong:?}");
+        assert!(wrong.grade > Grade::Good, "{wrong:?}");
         touch.imprints.reverse();
         touch.masks.reverse();
         let (_, swapped) = judged(&touch, &touch.tool);
@@ -196,7 +196,7 @@ fn the_verdict_tells_another_tool_a_blank_finger_and_swapped_ones_without_truth(
 }
 
 #[test]
-fn a_grasp_at_70_degrees_is_found_in_a_free_range_and_not_without_one() {
+fn a_grasp_at_70_degrees_is_found_unless_the_range_is_the_labs() {
     let tool = tools().iter().position(|tool| tool.name.contains("_35")).unwrap();
     let touch = Touch::held(tool, Grasp { theta_rad: 70f64.to_radians(), x_m: 0.004, y_m: -0.008 }, 3);
     let (points, images) = (touch.points(), touch.images());
@@ -205,12 +205,15 @@ fn a_grasp_at_70_degrees_is_found_in_a_free_range_and_not_without_one() {
         let ask = Ask { evidence: true, ..Ask::default() };
         register_with(&JointConfig { range }, contacts, &touch.tool, ask).unwrap()
     };
-    let [labs, free] = [Range::default(), Range::FREE].map(found);
+    let [labs, free] = [Range::LAB, Range::default()].map(found);
     assert!(touch.error_deg(&labs) > 20.0 && labs.answers.is_empty(), "{}", touch.error_deg(&labs));
     assert!(touch.error_deg(&free) < 2.0 && free.rung == Rung::Around, "{}", touch.error_deg(&free));
     assert_eq!(free.answers[0].grasp_from_object, free.grasp_from_object);
-    let objections = |report| Verdict::of(report).unwrap().against;
-    assert!(!objections(&free).iter().any(|sign| sign.what.contains("cannot hold")), "{:?}", objections(&free));
+    assert_eq!(Verdict::of(&free).unwrap().grade, Grade::Good, "{:?}", free.evidence);
+    // In the lab's range the answer, its evidence and its time are those of a search of that range alone.
+    let touch = Touch::new(tool, 3);
+    let [labs, free] = [Range::LAB, Range::default()].map(|range| touch.by(&JointConfig { range }).unwrap());
+    assert_eq!(AlignReport { range: Range::LAB, ..free }, labs);
 }
 
 #[test]
