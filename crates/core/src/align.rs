@@ -165,10 +165,8 @@ impl std::str::FromStr for Range {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        match text {
-            "free" => return Ok(Self::FREE),
-            "lab" => return Ok(Self::LAB),
-            _ => {}
+        if text == "free" || text == "lab" {
+            return Ok(if text == "lab" { Self::LAB } else { Self::FREE });
         }
         let ([least_deg, least_mm], [most_deg, most_mm]) = (Self::LAB.lengths(), Self::FREE.lengths());
         let number = |text: &str, within: std::ops::RangeInclusive<f64>| {

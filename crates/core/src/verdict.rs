@@ -1,7 +1,8 @@
 //! [`Verdict`]: how much a registered pose can be relied on, without the truth, in words. One for every view, table and file.
 
 use glam::DVec2;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, Serializer};
+use serde_json::json;
 
 use crate::align::{self, AlignReport, Basis, Evidence, PLACE_OPEN_M, Prior};
 use crate::manual::PoseDifference;
@@ -103,11 +104,36 @@ const ANYWHERE_ELSEWHERE: f64 = 2.0;
 /// Chance of the answer below which another one is told.
 const LIKELIEST: f64 = 0.5;
 
+/// Verdict on the angle of a pose, or on its place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Part {
+    /// The worst of what was found about it.
+    pub grade: Grade,
+    /// Its standard deviation, radians or meters.
+    pub sd: f64,
+}
+
+impl Part {
+    fn in_deg<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map([("grade", json!(self.grade)), ("sd_deg", json!(self.sd.to_degrees()))])
+    }
+
+    fn in_mm<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map([("grade", json!(self.grade)), ("sd_mm", json!(units::mm(self.sd)))])
+    }
+}
+
 /// Verdict on a pose: all that speaks against it, without the truth.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Verdict {
-    /// The worst of what was found.
+    /// The worse one of angle and place.
     pub grade: Grade,
+    /// The angle.
+    #[serde(serialize_with = "Part::in_deg")]
+    pub angle: Part,
+    /// The place.
+    #[serde(serialize_with = "Part::in_mm")]
+    pub place: Part,
     /// The reason, in a sentence: the worst of what was found, or how well it fits.
     pub why: String,
     /// Everything that speaks against it, the worst first.
@@ -145,8 +171,11 @@ pub enum SignKind {
 pub struct Sign {
     /// Kind of it.
     pub kind: SignKind,
-    /// Weight of it.
+    /// Weight of it: the greater one of those for the angle and the place.
     pub grade: Grade,
+    /// Its weights for the angle and for the place.
+    #[serde(skip)]
+    pub parts: [Grade; 2],
     /// In a few words.
     pub what: String,
 }
@@ -166,16 +195,24 @@ impl Verdict {
         Some(Self::with_place(report, evidence, across_m))
     }
 
+    /// `angle good (±0.3°), place uncertain (±3.20 mm)`.
+    pub fn parts_text(&self) -> String {
+        let word =
+            |part: Part| if part.grade == Grade::Check { "uncertain".to_owned() } else { part.grade.to_string() };
+        let (turn, shift) = (units::text_deg(self.angle.sd), units::text_mm(self.place.sd));
+        format!("angle {} (±{turn}), place {} (±{shift})", word(self.angle), word(self.place))
+    }
+
     /// The verdict, given the standard deviation of the place that counts, meters.
     fn with_place(report: &AlignReport, evidence: &Evidence, place_m: f64) -> Self {
         let mut against = signs(report, evidence, place_m);
+        let worst = |part: usize| against.iter().map(|sign| sign.parts[part]).max().unwrap_or(Grade::Good);
+        let angle = Part { grade: worst(0), sd: evidence.uncertainty.angle_rad() };
+        let place = Part { grade: worst(1), sd: place_m };
         against.retain(|sign| sign.grade > Grade::Good);
         against.sort_by_key(|sign| std::cmp::Reverse(sign.grade));
-        let (grade, why) = match against.first() {
-            Some(sign) => (sign.grade, sign.what.clone()),
-            None => (Grade::Good, fits(evidence)),
-        };
-        Self { grade, why, against }
+        let why = against.first().map_or_else(|| fits(evidence), |sign| sign.what.clone());
+        Self { grade: angle.grade.max(place.grade), angle, place, why, against }
     }
 }
 
@@ -191,16 +228,25 @@ fn fits(evidence: &Evidence) -> String {
 fn signs(report: &AlignReport, evidence: &Evidence, place_m: f64) -> Vec<Sign> {
     use SignKind::{AngleOpen, Beyond, Elsewhere, Fingers, MaskAlone, Misfit, OffTool, PlaceOpen, Several, Swapped};
     let mut signs = Vec::new();
-    let mut sign = |kind, grade, what| signs.push(Sign { kind, grade, what });
+    let mut sign = |kind, [angle, place]: [Grade; 2], what| {
+        signs.push(Sign { kind, grade: angle.max(place), parts: [angle, place], what });
+    };
+    // What slides along itself may be found elsewhere, and is no wrong pose for that.
+    let worst_place = if place_m > PLACE_SD_M[0] { Grade::Check } else { Grade::Wrong };
     if !report.within_prior {
         let [degrees, shift_mm] = report.range.lengths();
-        sign(Beyond, Grade::Check, format!("the pose lies outside the search range (±{degrees}°, ±{shift_mm} mm)"));
+        sign(
+            Beyond,
+            [Grade::Check; 2],
+            format!("the pose lies outside the search range (±{degrees}°, ±{shift_mm} mm)"),
+        );
     }
     let own: f64 = report.answers.iter().filter(|answer| answer.alike).map(|answer| answer.weight).sum();
     if let Some(other) = report.answers.iter().find(|answer| !answer.alike).filter(|_| own < LIKELIEST) {
         let off = PoseDifference::between(report.grasp_from_object, other.grasp_from_object);
         let (turned, moved) = (units::text_deg(off.angle_rad), units::text_mm(off.position_m));
-        sign(Several, Grade::Check, format!("another pose fits as well, {turned} and {moved} away"));
+        let angle = Grade::of_angle_error(off.angle_rad).min(Grade::Check);
+        sign(Several, [angle, Grade::Check], format!("another pose fits as well, {turned} and {moved} away"));
     }
     let off = 1.0 - evidence.on_tool;
     let percent = |share: f64| format!("{:.0} %", 100.0 * share);
@@ -212,19 +258,22 @@ fn signs(report: &AlignReport, evidence: &Evidence, place_m: f64) -> Vec<Sign> {
         if let Some(gain) = membrane.swapped {
             sign(
                 Swapped,
-                Grade::of(gain, limits.swapped),
+                [Grade::of(gain, limits.swapped); 2],
                 "the imprints fit better with the fingers swapped".to_owned(),
             );
         }
         let way =
             |to: align::Elsewhere| format!("{} and {}", units::text_deg(to.angle_rad), units::text_mm(to.position_m));
         if let Some(fingers) = membrane.fingers {
-            let apart = Grade::of(fingers.angle_rad, APART_RAD).max(Grade::of(fingers.position_m, APART_M));
+            let gain = Grade::of(fingers.gain, limits.fingers);
+            let place = Grade::of(fingers.position_m, APART_M).min(worst_place);
             let what = format!("the fingers do not agree: they are {} apart", way(fingers));
-            sign(Fingers, Grade::of(fingers.gain, limits.fingers).min(apart), what);
+            sign(Fingers, [Grade::of(fingers.angle_rad, APART_RAD), place].map(|apart| apart.min(gain)), what);
         }
         let what = format!("the membranes fit better {} away: check the mask", way(membrane.own));
-        sign(Elsewhere, Grade::of(membrane.own.gain, limits.elsewhere), what);
+        let gain = Grade::of(membrane.own.gain, limits.elsewhere);
+        let angle = Grade::of(membrane.own.angle_rad, APART_RAD).min(gain);
+        sign(Elsewhere, [angle, gain.min(worst_place)], what);
         let (unlike, off_tool) = (1.0 - membrane.likeness, off.min(OFF_CAP));
         let grade = if !Prior::default().allows(report.grasp_from_object) {
             Grade::of(unlike + ANYWHERE_OFF * off_tool + ANYWHERE_ELSEWHERE * membrane.own.gain, ANYWHERE)
@@ -233,16 +282,16 @@ fn signs(report: &AlignReport, evidence: &Evidence, place_m: f64) -> Vec<Sign> {
         };
         let (likeness, off) = (membrane.likeness, percent(off));
         let what = format!("the contact does not match this tool (similarity {likeness:.2}, {off} of it off the tool)");
-        sign(Misfit, grade, what);
+        sign(Misfit, [grade; 2], what);
     }
-    sign(OffTool, Grade::of(off, OFF), format!("{} of the contact mask lies off the tool", percent(off)));
+    sign(OffTool, [Grade::of(off, OFF); 2], format!("{} of the contact mask lies off the tool", percent(off)));
     let angle_rad = evidence.uncertainty.angle_rad();
     let what = format!("the contact does not determine the angle (±{})", units::text_deg(angle_rad));
-    sign(AngleOpen, Grade::of(angle_rad, limits.angle_rad), what);
+    sign(AngleOpen, [Grade::of(angle_rad, limits.angle_rad), Grade::Good], what);
     let what = format!("the contact does not determine the position (±{})", units::text_mm(place_m));
-    sign(PlaceOpen, Grade::of(place_m, PLACE_SD_M), what);
+    sign(PlaceOpen, [Grade::Good, Grade::of(place_m, PLACE_SD_M)], what);
     if let Some(fit) = report.joint.filter(|fit| !fit.basis.has_membrane()) {
-        sign(MaskAlone, Grade::Check, fit.basis.to_string());
+        sign(MaskAlone, [Grade::Check; 2], fit.basis.to_string());
     }
     signs
 }

@@ -71,6 +71,12 @@ impl Pose {
         self.result.verdict.as_ref().map(|verdict| verdict.grade.to_string())
     }
 
+    /// The verdict on the angle and on the place, each alone; their standard deviations are `sigma`.
+    #[getter]
+    fn grades(&self) -> Option<[String; 2]> {
+        self.result.verdict.as_ref().map(|verdict| [verdict.angle, verdict.place].map(|part| part.grade.to_string()))
+    }
+
     /// The reason of the verdict, in a sentence.
     #[getter]
     fn why(&self) -> Option<&str> {

@@ -209,7 +209,7 @@ pub(super) fn text(report: &Report) -> String {
             text += &format!("    {:>3.0} % {}\n", 100.0 * ranked.chance, ranked.tool);
         }
         if let Some(verdict) = c.verdict.as_ref().filter(|verdict| verdict.grade > Grade::Good) {
-            text += &format!("    {}: {}\n", verdict.grade, verdict.why);
+            text += &format!("    {}: {} ({})\n", verdict.grade, verdict.why, verdict.parts_text());
         }
     }
     text + "\n" + &summary_text(&report.summary)

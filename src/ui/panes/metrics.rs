@@ -107,8 +107,11 @@ fn pose(cx: &mut Cx<'_>, ui: &mut Ui) {
     }
 }
 
-/// The angle with its standard deviation, and how far it is off where the truth is known; in a narrow pane below it.
+/// The verdict in a word, the angle with its standard deviation, and how far it is off where the truth is known.
 fn angle(cx: &Cx<'_>, ui: &mut Ui, pose: &PoseResult) {
+    if let Some(verdict) = &pose.verdict {
+        ui.label(RichText::new(verdict.grade.to_string()).color(grade_color(cx.p, verdict.grade)));
+    }
     ui.label(value(pose.angle_text(), cx.p)).on_hover_text("Angle of the tool in the hand ± standard deviation");
     if let (Some(truth), Some(error)) = (pose.truth_rad, pose.error_rad) {
         let text = RichText::new(format!("off by {}", units::text_deg(error))).size(SMALL);
@@ -117,15 +120,13 @@ fn angle(cx: &Cx<'_>, ui: &mut Ui, pose: &PoseResult) {
     }
 }
 
-/// The verdict, in words; what else speaks against the pose behind it.
+/// The reason of the verdict; what it says of angle and place, and what else speaks against the pose, behind it.
 fn verdict(cx: &Cx<'_>, ui: &mut Ui, pose: &PoseResult) {
     let Some(verdict) = &pose.verdict else { return };
-    let text = RichText::new(format!("{}: {}", verdict.grade, verdict.why)).size(SMALL);
+    let text = RichText::new(&verdict.why).size(SMALL);
     let label = ui.add(Label::new(text.color(grade_color(cx.p, verdict.grade))).wrap());
-    let all: Vec<&str> = verdict.against.iter().map(|sign| sign.what.as_str()).collect();
-    if all.len() > 1 {
-        label.on_hover_text(all.join("\n"));
-    }
+    let others = verdict.against.iter().skip(1).map(|sign| sign.what.clone());
+    label.on_hover_text(std::iter::once(verdict.parts_text()).chain(others).collect::<Vec<_>>().join("\n"));
 }
 
 /// The place of the tool; how it was found behind it.

@@ -86,10 +86,10 @@ pub(crate) fn pose_time(pose: &PoseResult) -> String {
 pub(crate) fn pose_details(pose: &PoseResult) -> String {
     let report = &pose.report;
     let rung = if report.rung == Rung::Fixed { String::new() } else { format!(" · {}", report.rung) };
-    let beyond = if report.within_prior { "" } else { " · outside what the gripper can hold (±22.5°, ±5 mm)" };
+    let beyond = if report.within_prior { "" } else { " · outside the search range" };
     let open = if report.is_degenerate() { " · not fully determined" } else { "" };
     let refused =
-        if report.refused().is_some() { " · a better fit was rejected: no gripper could hold it there" } else { "" };
+        if report.refused().is_some() { " · a better fit outside the search range was rejected" } else { "" };
     let who = report.joint.map_or(String::new(), |fit| format!(" · from {}", fit.basis));
     format!(
         "{} points · residual {} · {}{rung}{who}{open}{beyond}{refused}",

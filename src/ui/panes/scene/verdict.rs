@@ -17,7 +17,6 @@ use touch2touch_core::align::MIN_POINTS;
 use touch2touch_core::manual::PoseDifference;
 use touch2touch_core::sample::Scale;
 use touch2touch_core::units;
-use touch2touch_core::verdict::Grade;
 
 /// Height of the line, points.
 const HEIGHT: f32 = 22.0;
@@ -107,6 +106,7 @@ fn said(cx: &Cx<'_>, source: ImprintSource, wide: bool) -> (String, Color32, Vec
             let mut details: Vec<String> = Vec::new();
             if let Some(verdict) = &pose.verdict {
                 details.push(format!("{}: {}", verdict.grade, verdict.why));
+                details.push(verdict.parts_text());
                 details.extend(verdict.against.iter().skip(1).map(|sign| format!("{}: {}", sign.grade, sign.what)));
             }
             details.push(format!("{}, {}", pose_details(pose), pose_time(pose)));
@@ -121,7 +121,7 @@ fn said(cx: &Cx<'_>, source: ImprintSource, wide: bool) -> (String, Color32, Vec
                 }
                 details.extend(pose.truth_rad.map(|truth| format!("true angle {}", units::text_deg(truth))));
             }
-            if let Some(verdict) = pose.verdict.as_ref().filter(|verdict| verdict.grade > Grade::Good) {
+            if let Some(verdict) = &pose.verdict {
                 text += &format!(" · {}", verdict.why);
             }
             if results::sample(state).ready().is_some_and(|sample| sample.scale == Scale::Assumed) {

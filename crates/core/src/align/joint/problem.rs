@@ -11,7 +11,7 @@ use super::image::Image;
 use super::smooth::BANDS;
 use super::template::{BandField, Grasp, Template, grasp_of, template};
 use super::turned::{Frame, Turned, turned};
-use super::{Basis, EXPLAINED, JointConfig, JointFit, PREDICTED_EXPLAINED};
+use super::{Basis, EXPLAINED, Found, JointConfig, JointFit, PREDICTED_EXPLAINED};
 use crate::align::batch::{Cloud, State};
 use crate::align::observability::of_cloud;
 use crate::align::planar::fits;
@@ -391,11 +391,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Scouts all around; a pose that they find is the answer if it is cheaper by a margin than the one in the prior.
-    pub(super) fn look_around(
-        &self,
-        points_yz: &[DVec2],
-        at_hand: Result<AlignReport, AlignError>,
-    ) -> Result<AlignReport, AlignError> {
+    pub(super) fn look_around(&self, points_yz: &[DVec2], at_hand: Found) -> Found {
         let mut descents = self.descents();
         descents.around = true;
         descents.patches[0] = self.patches_of(0, PLACES_AROUND);
@@ -410,29 +406,23 @@ impl<'a> Problem<'a> {
         for (run, at) in runs.iter_mut().enumerate() {
             self.settle(&mut descents, run, at, weight);
         }
-        let margin = |first: &Progress| if self.allowed(first) { AHEAD } else { 0.0 };
-        let limit =
-            known.map_or(f64::INFINITY, |_| runs.last().map_or(0.0, |first| first.cost * (1.0 - margin(first))));
+        // One in the prior stays unless another one is ahead.
+        let first = runs.last().filter(|first| known.is_some() && self.allowed(first));
+        let limit = first.map_or(f64::INFINITY, |first| first.cost * (1.0 - AHEAD));
+        let ends = runs.iter().map(|at| (at.state.to_pose(self.centroid), at.cost));
+        let ends = ends.filter(|(pose, _)| self.config.allows(*pose)).collect();
         let found = (0..runs.len()).filter(|run| self.config.allows(runs[*run].state.to_pose(self.centroid)));
         let winner = found.min_by(|a, b| runs[*a].cost.total_cmp(&runs[*b].cost)).filter(|run| runs[*run].cost < limit);
-        let told = winner.map(|run| descents.told(runs[run].state));
         let least = if self.predicted { PREDICTED_EXPLAINED } else { EXPLAINED };
-        let (Some(winner), Some((explained, noise_m))) = (winner, told.filter(|(explained, _)| *explained >= least))
-        else {
-            return at_hand.map(|report| AlignReport { ends: self.ends(&runs), ..report });
+        let told = winner.map(|run| (run, descents.told(runs[run].state)));
+        let Some((winner, (explained, noise_m))) = told.filter(|(_, (explained, _))| *explained >= least) else {
+            return at_hand.map(|report| AlignReport { ends, ..report });
         };
         let fit = self.fit(noise_m, weight, explained);
         let (starts, points) = (starts.iter().map(|at| at.to_pose(self.centroid)).collect(), descents.points());
         let (lookups, trace) = (descents.lookups, descents.trace);
-        let ends = self.ends(&runs);
         let answer = Answer { starts, runs, winner, rung: Rung::Around, fit, lookups, trace, points, settled: false };
         Ok(AlignReport { ends, ..self.report(points_yz, answer) })
-    }
-
-    /// Ends with their costs, those alone that the range allows.
-    fn ends(&self, runs: &[Progress]) -> Vec<(PlanarPose, f64)> {
-        let ends = runs.iter().map(|at| (at.state.to_pose(self.centroid), at.cost));
-        ends.filter(|(pose, _)| self.config.allows(*pose)).collect()
     }
 
     /// The last descent, again with the template of where it ended until that is the same.

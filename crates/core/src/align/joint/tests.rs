@@ -283,6 +283,11 @@ fn a_place_open_along_the_tool_is_no_fault_where_it_is_let_down_along_itself() {
     };
     let [held, let_down] = graded(3e-3, 1e-4);
     assert_eq!((held.grade, let_down.grade), (Grade::Check, Grade::Good));
+    assert_eq!((held.angle.grade, held.place.grade), (Grade::Good, Grade::Check));
+    let json = serde_json::to_value(&held).unwrap();
+    assert_eq!((json["angle"]["grade"].as_str(), json["place"]["grade"].as_str()), (Some("good"), Some("check")));
+    assert!((json["place"]["sd_mm"].as_f64().unwrap() - 3.0).abs() < 1e-3, "{json}");
+    assert!(held.parts_text().ends_with("place uncertain (±3.00 mm)"), "{}", held.parts_text());
     // Its sentence is its own: what is no fault is no reason.
     assert!(
         held.why.contains("not determine the position") && let_down.why.contains("lies on the tool"),
@@ -290,6 +295,18 @@ fn a_place_open_along_the_tool_is_no_fault_where_it_is_let_down_along_itself() {
     );
     assert_eq!(graded(1e-4, 3e-3).map(|verdict| verdict.grade), [Grade::Check; 2]);
     assert_eq!(graded(1e-4, 1e-4).map(|verdict| verdict.grade), [Grade::Good; 2]);
+    // Fingers that have it at two places along what is open: of the place alone, and no fault.
+    let mut fingers = evidence;
+    let apart = super::Elsewhere { angle_rad: 0.01, position_m: 9e-3, gain: 0.9 };
+    fingers.membrane = fingers.membrane.map(|membrane| MembraneEvidence { fingers: Some(apart), ..membrane });
+    let of = |along_m: f64| {
+        let uncertainty = spread_along(pose, [along_m, 1e-4]);
+        let report = AlignReport { evidence: Some(Evidence { uncertainty, ..fingers }), ..report.clone() };
+        let verdict = Verdict::of(&report).unwrap();
+        [verdict.angle.grade, verdict.place.grade]
+    };
+    assert_eq!(of(3e-3), [Grade::Good, Grade::Check]);
+    assert_eq!(of(1e-4), [Grade::Good, Grade::Wrong]);
 }
 
 #[test]
