@@ -20,7 +20,7 @@ use super::state::tasks::TaskKind;
 use super::state::view::Purpose;
 use super::state::workbench::{Layer, SceneTool};
 use super::state::{Absent, State};
-use super::workbench::in_hand;
+use super::workbench::{self, in_hand};
 use super::{export, results};
 use touch2touch_core::label::{CleanKind, Paint};
 
@@ -167,6 +167,10 @@ fn can_score_all(state: &State) -> bool {
 }
 
 /// Takes a tool of the 3D panes, or puts it away.
+fn answer(state: &State, by: isize) -> Option<Command> {
+    when(workbench::answer(state, by).is_some(), WorkbenchCommand::Answer(by))
+}
+
 fn toggle(state: &State, tool: SceneTool) -> Option<Command> {
     let next = if state.workbench.tool == tool { SceneTool::Look } else { tool };
     when(state.entry().is_some(), WorkbenchCommand::SetTool(next))

@@ -458,6 +458,15 @@ impl AlignReport {
         }
     }
 
+    /// `1 of 5 equal answers`, or `2 of 3 possible answers (31 %)`; `None` where a pose is not one of several answers.
+    pub fn answers_text(&self, pose: PlanarPose) -> Option<String> {
+        let at = self.answers.iter().position(|answer| answer.grasp_from_object == pose)?;
+        let (number, of, percent) = (at + 1, self.answers.len(), 100.0 * self.answers[at].weight);
+        let equal = self.answers.iter().all(|answer| answer.alike);
+        let some = if equal { "equal answers".to_owned() } else { format!("possible answers ({percent:.0} %)") };
+        (of > 1).then(|| format!("{number} of {of} {some}"))
+    }
+
     /// The angle as the lab reports it: the rotation of `object_from_grasp`, radians.
     pub fn lab_angle_rad(&self) -> f64 {
         self.grasp_from_object.inverse().theta_rad

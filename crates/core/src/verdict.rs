@@ -98,9 +98,9 @@ const PLACE_SD_M: Limits = [PLACE_OPEN_M, f64::INFINITY];
 
 /// Limits of one minus likeness plus these shares of what else speaks against a tool, each by its weight, of a pose beyond the
 /// lab's grasps: among all poses any tool fits somewhere, and no one sign tells it. From other tools at fresh grasps.
-const ANYWHERE: Limits = [0.44, 0.8];
-const ANYWHERE_OFF: f64 = 1.5;
-const ANYWHERE_ELSEWHERE: f64 = 2.0;
+const ANYWHERE: Limits = [0.6, 1.0];
+const ANYWHERE_OFF: f64 = 2.0;
+const ANYWHERE_ELSEWHERE: f64 = 4.0;
 /// Chance of the answer below which another one is told.
 const LIKELIEST: f64 = 0.5;
 

@@ -37,8 +37,6 @@ const DOUBTFUL: f64 = 0.3;
 const EXPLAINED: f64 = 0.05;
 /// The same of a predicted one.
 const PREDICTED_EXPLAINED: f64 = 0.5;
-/// Share of the mask's points on the silhouette from which on a pose that it gives at once is not looked for elsewhere.
-const MASK_STANDS: f64 = 0.9;
 
 /// The registration by membrane and mask. The default is what the product uses.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -114,11 +112,6 @@ impl JointConfig {
             let within_prior = report.within_prior || self.allows(report.grasp_from_object);
             Ok(AlignReport { joint: Some(fit), range: self.range, within_prior, ..report })
         };
-        let stood = |found: Found| {
-            let sure = |at: &AlignReport| at.rung == Rung::Single && at.inlier_share >= MASK_STANDS;
-            let stands = found.as_ref().is_ok_and(sure);
-            (found, stands)
-        };
         if scene.images().is_empty() {
             return (by_mask(JointFit::by_mask(Basis::NoImage)), true);
         }
@@ -135,14 +128,14 @@ impl JointConfig {
         }
         let mut answer = problem.solve();
         if problem.predicted && answer.fit.explained < PREDICTED_EXPLAINED {
-            return stood(by_mask(JointFit { basis: Basis::Unlike, mask_weight: 1.0, ..answer.fit }));
+            return (by_mask(JointFit { basis: Basis::Unlike, mask_weight: 1.0, ..answer.fit }), false);
         }
         if answer.fit.explained < DOUBTFUL {
             // A bad mask can lead all scouts away from what the membrane shows plainly.
             answer = problem.solve_without_mask(&answer, EXPLAINED).unwrap_or(answer);
         }
         if answer.fit.explained < EXPLAINED {
-            return stood(by_mask(JointFit { basis: Basis::LittleContact, mask_weight: 1.0, ..answer.fit }));
+            return (by_mask(JointFit { basis: Basis::LittleContact, mask_weight: 1.0, ..answer.fit }), false);
         }
         let stands = problem.stands(&answer);
         (Ok(problem.report(scene.yz(), answer)), stands)

@@ -22,6 +22,8 @@ pub enum SceneLayer {
     Cad,
     /// The model where it was registered, while a hand holds it elsewhere.
     Registered,
+    /// The model at the poses that fit about as well.
+    Answers,
     /// The model at the registered pose of the other side.
     OtherCad,
     /// The model at the true pose.

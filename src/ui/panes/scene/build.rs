@@ -120,6 +120,7 @@ pub(super) fn color(cx: &Cx<'_>, source: ImprintSource, layer: SceneLayer) -> Co
         // Lit from all sides it is darker than its color: before a light ground it begins paler.
         SceneLayer::Cad if *p == theme::LIGHT => theme::mix(p.cad, Color32::WHITE, 0.5),
         SceneLayer::Cad | SceneLayer::Registered => p.cad,
+        SceneLayer::Answers => p.caution,
         SceneLayer::OtherCad => theme::mix(p.strong, side_color(p, source.other()), 0.7),
         SceneLayer::TrueCad => p.strong,
         SceneLayer::Guides => p.weak,
@@ -209,6 +210,10 @@ pub(super) fn models(cx: &Cx<'_>, source: ImprintSource) -> Vec<(SceneLayer, DAf
         }
         (None, None) => {}
     }
+    // What the tool's symmetry makes of the answer looks like it.
+    let answers = results::pose(state, source).shown().map_or(&[][..], |pose| &pose.report.answers);
+    let others = answers.iter().filter(|answer| !answer.alike);
+    models.extend(others.map(|answer| (SceneLayer::Answers, answer.grasp_from_object.to_affine())));
     let other = results::pose(state, source.other()).ready().filter(|_| state.workbench.both_clouds);
     models.extend(other.map(|pose| (SceneLayer::OtherCad, pose.grasp_from_object.to_affine())));
     let truth = results::sample(state).ready().and_then(|sample| sample.grasp_from_object);
@@ -221,13 +226,13 @@ fn meshes(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, scene: &mut Scene
     let state = cx.state;
     let tool_now = results::tool(state).ready().map(|t| t.name.as_str());
     let Some(mesh) = memory.mesh.as_ref().filter(|m| Some(m.key.1.as_str()) == tool_now) else { return };
-    for (layer, world_from_mesh) in models(cx, source) {
+    for (number, (layer, world_from_mesh)) in models(cx, source).into_iter().enumerate() {
         if !state.settings.scene.shows(layer) {
             continue;
         }
         let color = color(cx, source, layer);
         let mut item = MeshItem {
-            name: format!("CAD {layer:?}"),
+            name: format!("CAD {layer:?} {number}"),
             revision: mesh.revision,
             mesh: mesh.mesh.clone(),
             shading: Shading::Smooth,

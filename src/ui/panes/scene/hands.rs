@@ -47,6 +47,10 @@ pub(super) fn strip(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: R
                 let (angle, position) = (units::text_deg(off.angle_rad), units::text_mm(off.position_m));
                 text += &format!("   (error {angle}, {position})");
             }
+            let found = results::pose(cx.state, source).shown();
+            if let Some(answers) = found.and_then(|found| found.report.answers_text(pose)) {
+                text += &format!("   {answers}");
+            }
             ui.label(RichText::new(text).size(SMALL).color(cx.p.strong));
             let (text, color) = cost_text(cx, hand.as_ref());
             ui.label(RichText::new(text).size(SMALL).color(color)).on_hover_text(

@@ -96,7 +96,9 @@ fn rows(cx: &Cx<'_>, memory: &Memory, source: ImprintSource) -> Vec<Row> {
         add(SceneLayer::OtherContact, other);
     }
     if memory.mesh.is_some() {
-        for (layer, _) in build::models(cx, source) {
+        let mut layers: Vec<SceneLayer> = build::models(cx, source).into_iter().map(|(layer, _)| layer).collect();
+        layers.dedup();
+        for layer in layers {
             add(layer, model_name(cx, source, layer));
         }
     }
@@ -125,6 +127,7 @@ fn model_name(cx: &Cx<'_>, source: ImprintSource, layer: SceneLayer) -> &'static
         SceneLayer::Cad if cx.state.workbench.hand(source).is_some() => "CAD, being moved",
         SceneLayer::Cad if results::by_hand(cx.state, source).is_some() => "CAD, pose by hand",
         SceneLayer::TrueCad => "CAD, true pose",
+        SceneLayer::Answers => "CAD, other answers",
         SceneLayer::OtherCad if source == ImprintSource::Measured => "CAD, predicted side",
         SceneLayer::OtherCad => "CAD, measured side",
         _ => "CAD, registered",

@@ -21,7 +21,7 @@ const PLACES: usize = 1200;
 /// Poses that go on to each band, coarse to fine.
 const KEEP: [usize; LAST] = [24, 12, 8];
 /// Share by which they may be dearer than the cheapest after each band.
-const WORTH: [f64; LAST] = [0.6, 0.4, 0.25];
+pub(super) const WORTH: [f64; LAST] = [0.6, 0.4, 0.25];
 
 /// An image's cells with depth: the first that they are compared with, and the height.
 type Cells = Vec<(usize, f32)>;

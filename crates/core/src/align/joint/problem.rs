@@ -1,11 +1,12 @@
 //! The search for the pose under which templates and silhouette fit the membranes and the mask.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 use std::rc::Rc;
 use std::sync::Arc;
 
 use glam::DVec2;
 
+use super::anywhere::WORTH;
 use super::cost::{Joint, MaskPart, Noted, Patch, Relief, noise_m};
 use super::image::Image;
 use super::smooth::BANDS;
@@ -21,6 +22,7 @@ use crate::align::{
 };
 use crate::frames::PlanarPose;
 use crate::mesh::sampling::spread;
+use crate::symmetry::Symmetry;
 use crate::tent::FreeShape;
 use crate::tool::ToolModel;
 
@@ -112,7 +114,7 @@ pub(super) struct Answer {
     pub(super) lookups: usize,
     trace: Vec<TraceStep>,
     points: usize,
-    /// True where scouts met in the best end, in the prior, and none nearly as good lies elsewhere.
+    /// True where scouts met in the best end, in the prior, and none nearly as good lies elsewhere or is the tool turned by a half.
     settled: bool,
 }
 
@@ -357,7 +359,7 @@ impl<'a> Problem<'a> {
                 runs.iter().partition(|at| alike(&at.state, &best.state));
             let rival = apart.iter().any(|at| at.cost < best.cost * (1.0 + CLOSE));
             if self.allowed(best) && met.len() > 1 && !rival {
-                settled = true;
+                settled = !self.fits_turned(&mut descents, best.state);
                 break order;
             }
             let Some(shares) = more.next() else { break order };
@@ -372,6 +374,25 @@ impl<'a> Problem<'a> {
         let fit = self.fit(noise_m, mask_weight, explained);
         let points = descents.points();
         Answer { starts, runs, winner, rung, fit, lookups: descents.lookups, trace: descents.trace, points, settled }
+    }
+
+    /// True where the tool turned by a half about the contact fits about as well, in a pose that is allowed; not for one that a
+    /// half turn takes to itself.
+    fn fits_turned(&self, descents: &mut Descents<'_, '_>, best: State) -> bool {
+        let state = State { phi: crate::units::wrap_angle(best.phi + PI), ..best };
+        let half = |turn: &PlanarPose| (turn.theta_rad.abs() - PI).abs() < 1e-6;
+        if !self.config.allows(state.to_pose(self.centroid)) || Symmetry::of(self.tool).turns.iter().any(half) {
+            return false;
+        }
+        let steps = descents.trace.len();
+        let (mut turned, mut own) = (Progress::new(state), Progress::new(best));
+        let fits = WORTH.into_iter().enumerate().all(|(stage, worth)| {
+            descents.descend(0, &mut turned, stage, SCOUTS_WEIGHT);
+            descents.descend(0, &mut own, stage, SCOUTS_WEIGHT);
+            turned.cost <= own.cost * (1.0 + worth)
+        });
+        descents.trace.truncate(steps);
+        fits
     }
 
     fn fit(&self, noise_m: f64, mask_weight: f64, explained: f64) -> JointFit {
@@ -413,9 +434,9 @@ impl<'a> Problem<'a> {
         let ends = ends.filter(|(pose, _)| self.config.allows(*pose)).collect();
         let found = (0..runs.len()).filter(|run| self.config.allows(runs[*run].state.to_pose(self.centroid)));
         let winner = found.min_by(|a, b| runs[*a].cost.total_cmp(&runs[*b].cost)).filter(|run| runs[*run].cost < limit);
-        let least = if self.predicted { PREDICTED_EXPLAINED } else { EXPLAINED };
         let told = winner.map(|run| (run, descents.told(runs[run].state)));
-        let Some((winner, (explained, noise_m))) = told.filter(|(_, (explained, _))| *explained >= least) else {
+        let told = told.filter(|(_, (explained, _))| !self.predicted || *explained >= PREDICTED_EXPLAINED);
+        let Some((winner, (explained, noise_m))) = told else {
             return at_hand.map(|report| AlignReport { ends, ..report });
         };
         let fit = self.fit(noise_m, weight, explained);
