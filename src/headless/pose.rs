@@ -28,7 +28,8 @@ use touch2touch_pipeline::steps::recipe::{Recipe, Stage};
 use touch2touch_pipeline::steps::tool::load_tool;
 
 pub(super) use args::{PoseArgs, parse_start};
-use report::{Accepted, AnswerRow, First, PoseRow, RankedTool, Report, summary, text};
+pub(super) use report::AnswerRow;
+use report::{Accepted, First, PoseRow, RankedTool, Report, summary, text};
 
 /// Word of `--tool` for trying all tools.
 const ANY: &str = "any";

@@ -34,6 +34,7 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use super::frames::PlanarPose;
+use super::units::angle_error;
 
 pub use joint::{Basis, Elsewhere, Evidence, JointConfig, JointFit, MembraneEvidence, PoseAnswer};
 pub use lab_icp::{LabIcpConfig, LabModel, lab_icp};
@@ -465,6 +466,20 @@ impl AlignReport {
         let equal = self.answers.iter().all(|answer| answer.alike);
         let some = if equal { "equal answers".to_owned() } else { format!("possible answers ({percent:.0} %)") };
         (of > 1).then(|| format!("{number} of {of} {some}"))
+    }
+
+    /// Takes, of the poses that the tool's symmetry makes of the answer, the one whose angle is nearest to that of another pose:
+    /// a tool that is followed does not turn over.
+    pub fn keep_to(&mut self, last: PlanarPose) {
+        let turned = |answer: &PoseAnswer| angle_error(answer.grasp_from_object.theta_rad, last.theta_rad).abs();
+        let alike = self.answers.iter().enumerate().filter(|(_, answer)| answer.alike);
+        let Some((nearest, _)) = alike.min_by(|(_, a), (_, b)| turned(a).total_cmp(&turned(b))) else { return };
+        self.answers.swap(0, nearest);
+        let (from, to) = (self.grasp_from_object, self.answers[0].grasp_from_object);
+        if let Some(evidence) = &mut self.evidence {
+            evidence.uncertainty = evidence.uncertainty.moved(from, to);
+        }
+        self.grasp_from_object = to;
     }
 
     /// The angle as the lab reports it: the rotation of `object_from_grasp`, radians.

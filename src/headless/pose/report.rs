@@ -57,7 +57,7 @@ pub(super) struct PoseRow {
 
 /// A pose that the touch allows, in the sense of the other numbers of a [`PoseRow`].
 #[derive(Debug, Clone, Copy, Serialize)]
-pub(super) struct AnswerRow {
+pub(in crate::headless) struct AnswerRow {
     pub(super) angle_deg: f64,
     pub(super) y_m: f64,
     pub(super) z_m: f64,
@@ -66,7 +66,7 @@ pub(super) struct AnswerRow {
 }
 
 impl AnswerRow {
-    pub(super) fn new(answer: &PoseAnswer) -> Self {
+    pub(in crate::headless) fn new(answer: &PoseAnswer) -> Self {
         let PlanarPose { theta_rad, y_m, z_m } = answer.grasp_from_object.inverse();
         Self { angle_deg: theta_rad.to_degrees(), y_m, z_m, weight: answer.weight }
     }

@@ -10,6 +10,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::super::output::says;
+use super::super::pose::AnswerRow;
 use super::super::recipe::{misgiving, warm_up};
 use super::{Latency, WatchArgs, files};
 use touch2touch_core::contact::ContactMask;
@@ -54,6 +55,8 @@ pub(super) struct Worker {
     recipe: Recipe,
     pub(super) models: Models,
     tools: BTreeMap<String, Arc<ToolModel>>,
+    /// The pose of each tool at its last touch.
+    last: BTreeMap<String, PlanarPose>,
     stop: Cancel,
     /// Seconds that loading and the first run took.
     pub warm_s: f64,
@@ -66,7 +69,7 @@ impl Worker {
         let (models, start) = (args.recipe.model.models(), Instant::now());
         warm_up(&recipe, &models)?;
         let warm_s = start.elapsed().as_secs_f64();
-        Ok(Self { recipe, models, tools: BTreeMap::new(), stop, warm_s })
+        Ok(Self { recipe, models, tools: BTreeMap::new(), last: BTreeMap::new(), stop, warm_s })
     }
 
     /// Everything the result depends on besides the touch.
@@ -82,7 +85,7 @@ impl Worker {
     }
 
     /// Predicts, poses and writes. `None` if the run was told to stop meanwhile.
-    pub(super) fn work(&self, touch: Touch<'_>, arrived: Arrived<'_>) -> anyhow::Result<Option<Done>> {
+    pub(super) fn work(&mut self, touch: Touch<'_>, arrived: Arrived<'_>) -> anyhow::Result<Option<Done>> {
         let Arrived { ready, tool, begun: (found, start), stem, source, recipe } = arrived;
         let sample = touch.sample;
         let ms = || start.elapsed().as_secs_f64() * 1e3;
@@ -100,6 +103,10 @@ impl Worker {
         // Without a tool, that is the reason, whatever else is missing.
         let (pose, no_pose, said) = match (tool, touch.tool.and(estimate.pose())) {
             (Some(name), Ok(found)) => {
+                // Of equal answers the one of the touch before: what is followed does not turn over.
+                let last = self.last.entry(name.to_owned()).or_insert(found.grasp_from_object);
+                let found = &found.clone().kept_to(*last);
+                *last = found.grasp_from_object;
                 let PlanarPose { y_m, z_m, .. } = found.object_from_grasp();
                 let (angle, y, z) = (found.angle_rad.to_degrees(), y_m * 1e3, z_m * 1e3);
                 (Some(posed(name, found)), None, format!("{angle:.1} deg, y {y:.2} mm, z {z:.2} mm"))
@@ -236,7 +243,7 @@ fn posed(tool: &str, found: &PoseResult) -> Value {
         "tool": tool, "angle_deg": found.angle_rad.to_degrees(), "y_m": place.y_m, "z_m": place.z_m,
         "grasp_from_object": found.grasp_from_object, "angle_sd_deg": found.angle_sd_rad().map(f64::to_degrees),
         "covariance": found.report.evidence.map(|evidence| evidence.uncertainty.covariance),
-        "verdict": found.verdict, "rms_m": found.rms_m, "points": found.num_points, "stop": found.stop,
+        "verdict": found.verdict, "answers": found.report.answers.iter().map(AnswerRow::new).collect::<Vec<_>>(), "rms_m": found.rms_m, "points": found.num_points, "stop": found.stop,
         "truth_deg": found.truth_rad.map(f64::to_degrees), "error_deg": found.error_rad.map(f64::to_degrees),
     })
 }

@@ -72,6 +72,14 @@ impl Uncertainty {
         Self { covariance: covariance.into(), ..self }
     }
 
+    /// The same of another pose that no touch tells apart from this one.
+    #[must_use]
+    pub(super) fn moved(self, from: PlanarPose, to: PlanarPose) -> Self {
+        let arm = DVec2::new(to.y_m - from.y_m, to.z_m - from.z_m).perp();
+        let moved = Matrix3::new(1.0, 0.0, 0.0, arm.x, 1.0, 0.0, arm.y, 0.0, 1.0);
+        Self { covariance: (moved * Matrix3::from(self.covariance) * moved.transpose()).into(), ..self }
+    }
+
     /// Standard deviation of the angle, radians.
     pub fn angle_rad(&self) -> f64 {
         self.covariance[0][0].sqrt()

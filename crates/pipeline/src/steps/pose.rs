@@ -67,6 +67,15 @@ impl PoseResult {
         self.angle_sd_rad().map_or(angle.clone(), |spread| format!("{angle} ± {}", units::text_deg(spread)))
     }
 
+    /// The same, of equal answers the nearest to another pose.
+    #[must_use]
+    pub fn kept_to(mut self, last: PlanarPose) -> Self {
+        self.report.keep_to(last);
+        (self.grasp_from_object, self.angle_rad) = (self.report.grasp_from_object, self.report.lab_angle_rad());
+        self.error_rad = self.truth_rad.map(|truth| units::angle_error(self.angle_rad, truth));
+        self
+    }
+
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         size_of::<Self>()

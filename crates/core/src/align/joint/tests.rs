@@ -217,6 +217,24 @@ fn a_grasp_at_70_degrees_is_found_unless_the_range_is_the_labs() {
 }
 
 #[test]
+fn a_tool_that_is_followed_does_not_turn_over_to_an_equal_answer() {
+    let tool = tools().iter().position(|tool| tool.name.contains("_03_")).unwrap();
+    let touch = Touch::new(tool, 3);
+    let (first, _) = judged(&touch, &touch.tool);
+    let pose = first.grasp_from_object;
+    assert_eq!(first.answers_text(pose).as_deref(), Some("1 of 4 equal answers"));
+    let mut kept = first.clone();
+    kept.keep_to(PlanarPose { theta_rad: pose.theta_rad + 1.4, ..pose });
+    let turned = crate::units::angle_error(kept.grasp_from_object.theta_rad, pose.theta_rad).to_degrees();
+    assert!((turned - 90.0).abs() < 1e-6 && kept.answers[0].grasp_from_object == kept.grasp_from_object, "{turned}");
+    // The point in the middle of the contact is as well known as before.
+    let spread = |report: &AlignReport| report.evidence.unwrap().uncertainty.place_m(report.grasp_from_object);
+    assert!((spread(&kept) / spread(&first) - 1.0).abs() < 1e-9, "{} {}", spread(&kept), spread(&first));
+    kept.keep_to(pose);
+    assert!((kept.grasp_from_object.theta_rad - pose.theta_rad).abs() < 1e-12);
+}
+
+#[test]
 fn the_spread_is_as_wide_as_what_the_contact_leaves_open() {
     let touch = Touch::new(0, 3);
     let (report, _) = judged(&touch, &touch.tool);
