@@ -18,7 +18,7 @@ use touch2touch_pipeline::pairs;
 #[derive(Debug, Clone, Args)]
 pub struct DatasetArgs {
     /// The data set: a folder in the lab's layout or of image pairs, or a built-in one: `demo`, `test-set` (46 unseen
-    /// grasps of each of 9 seen and 3 unseen tools, simulated), `test-set-ambiguous`, `-mixed`, `-misaligned`, `-noise`.
+    /// grasps of each of 9 seen and 3 unseen tools, simulated), `test-set-ambiguous`, `-mixed`, `-misaligned`, `-noise`, `-turned`.
     #[arg(value_name = "PATH")]
     path: PathBuf,
     #[command(flatten)]

@@ -34,7 +34,8 @@ pub(super) struct SimulateArgs {
     #[arg(long, conflicts_with_all = ["grasps", "seed", "faults", "part"])]
     test_set: bool,
     /// Condition of the pairs, as in the paper's Table I. ambiguous: the GelSlims close on the tool's bare shaft; mixed:
-    /// every other pair does; misaligned: the bubbles grasp up to 8 mm away; noise: on the GelSlim image.
+    /// every other pair does; misaligned: the bubbles grasp up to 8 mm away; noise: on the GelSlim image; turned: grasps over
+    /// the full turn.
     #[arg(long, default_value = "plain", conflicts_with = "faults", value_parser = condition())]
     condition: Condition,
     /// Simulate with another pair of sensors, drawn by this seed as training draws them (default: the nominal pair).

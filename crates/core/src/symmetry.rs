@@ -9,6 +9,7 @@ use super::frames::PlanarPose;
 use super::mesh::sampling::spread;
 use super::tent::{Sheet, heights};
 use super::tool::ToolModel;
+use super::units::angle_error;
 
 /// Parts of a full turn that are tried; a model that the finest one takes to itself is round.
 const PARTS: [u32; 6] = [2, 3, 4, 5, 6, 36];
@@ -64,6 +65,12 @@ impl Symmetry {
     /// The poses, `grasp_from_object`, that no touch tells apart from this one, itself first.
     pub fn alike(&self, grasp_from_object: PlanarPose) -> impl Iterator<Item = PlanarPose> {
         std::iter::once(grasp_from_object).chain(self.turns.iter().map(move |turn| grasp_from_object.compose(*turn)))
+    }
+
+    /// Of these the one whose angle is nearest to that of another pose.
+    pub fn nearest(&self, grasp_from_object: PlanarPose, to: PlanarPose) -> PlanarPose {
+        let off = |pose: &PlanarPose| angle_error(pose.theta_rad, to.theta_rad).abs();
+        self.alike(grasp_from_object).min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(grasp_from_object)
     }
 }
 

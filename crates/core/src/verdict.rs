@@ -98,7 +98,7 @@ const PLACE_SD_M: Limits = [PLACE_OPEN_M, f64::INFINITY];
 
 /// Limits of one minus likeness plus these shares of what else speaks against a tool, each by its weight, of a pose beyond the
 /// lab's grasps: among all poses any tool fits somewhere, and no one sign tells it. From other tools at fresh grasps.
-const ANYWHERE: Limits = [0.6, 1.0];
+const ANYWHERE: Limits = [0.55, 1.0];
 const ANYWHERE_OFF: f64 = 2.0;
 const ANYWHERE_ELSEWHERE: f64 = 4.0;
 /// Chance of the answer below which another one is told.

@@ -14,8 +14,10 @@ use super::super::state::{Absent, Lookup, State};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::DepthMap;
+use touch2touch_core::manual::PoseDifference;
 use touch2touch_core::rig::PadId;
 use touch2touch_core::sample::{ColorTouch, DepthTouch, PadTouch, Sample};
+use touch2touch_core::symmetry::Symmetry;
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::steps::imprint;
 use touch2touch_pipeline::steps::tool::{LoadedTool, load_tool};
@@ -63,9 +65,11 @@ pub fn bubble(state: &State, finger: PadId) -> Lookup<'_, DepthTouch> {
     touch(state, finger).and_then(Absent::NoBubble, |touch| touch.depth())
 }
 
-/// The true pose of the selected pair, `grasp_from_object`, where it is known.
-pub fn truth(state: &State) -> Option<PlanarPose> {
-    sample(state).ready()?.grasp_from_object
+/// Difference of a pose, `grasp_from_object`, from the true one of the selected pair, up to the tool's symmetry, where it is known.
+pub fn off_truth(state: &State, pose: PlanarPose) -> Option<PoseDifference> {
+    let (truth, tool) = (sample(state).ready()?.grasp_from_object?, tool(state).ready());
+    let truth = tool.map_or(truth, |tool| Symmetry::of(&tool.model).nearest(truth, pose));
+    Some(PoseDifference::between(pose, truth))
 }
 
 impl Computes for ThumbnailKey {

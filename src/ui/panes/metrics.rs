@@ -12,7 +12,6 @@ use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{SMALL, caption, grade_color, section, value};
 use crate::ui::parts::widget::line::Line;
 use strum::IntoEnumIterator as _;
-use touch2touch_core::manual::PoseDifference;
 use touch2touch_core::postprocess::Severity;
 use touch2touch_core::sample::Scale;
 use touch2touch_core::units;
@@ -149,7 +148,7 @@ fn place(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, pose: &PoseResult)
     }
     let Some(hand) = results::by_hand(cx.state, source) else { return };
     let angle = units::text_deg(hand.inverse().theta_rad);
-    let error = results::truth(cx.state).map(|truth| PoseDifference::between(hand, truth).angle_rad);
+    let error = results::off_truth(cx.state, hand).map(|off| off.angle_rad);
     let error = error.map_or(String::new(), |error| format!(" (error {})", units::text_deg(error)));
     ui.horizontal(|ui| {
         ui.label(RichText::new(format!("Pose by hand: {angle}{error}")).size(SMALL).color(cx.p.good));

@@ -189,10 +189,9 @@ fn figures(cx: &Cx<'_>, ui: &mut Ui, shown: Inspected<'_>) {
     let (step, pose) = (shown.step, shown.step.grasp_from_object);
     let mut color = cx.p.strong;
     let mut text = pose_text(pose);
-    if let Some(truth) = results::truth(cx.state) {
-        let error = units::angle_error(pose.theta_rad, truth.theta_rad);
-        text += &format!("   off by {}", units::text_deg(error));
-        color = scene::error_color(cx.p, error);
+    if let Some(off) = results::off_truth(cx.state, pose) {
+        text += &format!("   off by {}", units::text_deg(off.angle_rad));
+        color = scene::error_color(cx.p, off.angle_rad);
     }
     ui.add(Label::new(RichText::new(text).size(12.0).color(color)).truncate())
         .on_hover_text("Angle with the sign that the lab reports; position of the tool's origin in the grasp frame");

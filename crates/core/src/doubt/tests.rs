@@ -44,7 +44,8 @@ fn sound_sets_of_every_condition_and_of_other_sensors_raise_no_doubt() {
         let config = if number % 2 == 0 { SimConfig::default() } else { SimConfig::randomised(number) };
         // Of bare shafts one finger alone is seldom right.
         for pairs in [1, if condition == Condition::Ambiguous { 8 } else { 4 }] {
-            assert!(set(condition, pairs, &config).judged().is_empty(), "{condition:?}, {pairs} pairs");
+            let doubts = set(condition, pairs, &config).judged();
+            assert!(doubts.is_empty(), "{condition:?}, {pairs} pairs: {doubts:?}");
         }
     }
     assert!(judge(&[], &BTreeMap::new(), None).is_empty());

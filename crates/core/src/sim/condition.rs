@@ -1,5 +1,7 @@
 //! Conditions of a pair: what can be wrong with it, after the paper's Table I, for test sets and for training data.
 
+use std::f64::consts::PI;
+
 use serde::{Deserialize, Serialize};
 
 use super::{Grasp, SimConfig, simulate, simulate_apart};
@@ -11,6 +13,8 @@ use crate::sample::Sample;
 
 /// Largest distance along y and z between the grasps of a misaligned pair, meters.
 pub(crate) const MISALIGNMENT_M: f64 = 0.008;
+/// Places of the turned condition, as a multiple of those of the lab's grid.
+const TURNED: f64 = 3.0;
 /// Standard deviation of the noise on the condition, 0..255 scale, RGB: half that of the lab's difference images.
 const NOISE_STD: [f32; 3] = [0.5 * 0.0687 * 255.0, 0.5 * 0.0428 * 255.0, 0.5 * 0.0576 * 255.0];
 
@@ -31,6 +35,8 @@ pub enum Condition {
     Misaligned,
     /// White noise on the GelSlim image.
     Noise,
+    /// Grasps over the full turn and [`TURNED`] times as far off: of a tool that the hand met in any orientation.
+    Turned,
 }
 
 impl Condition {
@@ -46,6 +52,7 @@ impl Condition {
             Self::Ambiguous => "the GelSlims closed on the bare shaft of the tool and see nothing of its pattern",
             Self::Mixed => "every other pair is ambiguous (bare shaft), the rest plain",
             Self::Misaligned => "the bubbles grasped up to 8 mm away along y and z from where the GelSlims did",
+            Self::Turned => "the grasps cover the full turn and 15 mm to each side instead of 22.5 degrees and 5 mm",
             Self::Noise => "white noise on the GelSlim image, half as strong as the lab's images vary",
         }
     }
@@ -66,6 +73,11 @@ impl Condition {
                 let mut off = || noise.uniform(-MISALIGNMENT_M, MISALIGNMENT_M);
                 let elsewhere = Grasp { x_m: grasp.x_m + off(), y_m: grasp.y_m + off(), ..grasp };
                 simulate_apart(tool, grasp, elsewhere, seed, config)
+            }
+            Self::Turned => {
+                let theta_rad = grasp.theta_rad * (PI / super::grasp::THETA_RANGE_RAD);
+                let grasp = Grasp { theta_rad, x_m: TURNED * grasp.x_m, y_m: TURNED * grasp.y_m };
+                simulate(tool, grasp, seed, config)
             }
             Self::Noise => {
                 let mut sample = simulate(tool, grasp, seed, config);

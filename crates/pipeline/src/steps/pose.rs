@@ -8,6 +8,7 @@ use crate::error::TaskError;
 use touch2touch_core::align::{AlignReport, Ask, Contacts, Evidence, PointFit, Register, Scene, TraceStep};
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::pose::ToolModel;
+use touch2touch_core::symmetry::Symmetry;
 use touch2touch_core::units;
 use touch2touch_core::verdict::Verdict;
 
@@ -20,7 +21,7 @@ pub struct PoseResult {
     pub middle_x_m: f64,
     /// The angle that the lab reports: of `object_from_grasp`, radians.
     pub angle_rad: f64,
-    /// The true angle in the same sense, where known.
+    /// The true angle in the same sense, where known; of equal ones, by the tool's symmetry, the one nearest to the answer.
     pub truth_rad: Option<f64>,
     /// Size of the angle's error, where the truth is known.
     pub error_rad: Option<f64>,
@@ -71,8 +72,9 @@ impl PoseResult {
     #[must_use]
     pub fn kept_to(mut self, last: PlanarPose) -> Self {
         self.report.keep_to(last);
+        let turned = self.report.lab_angle_rad() - self.angle_rad;
         (self.grasp_from_object, self.angle_rad) = (self.report.grasp_from_object, self.report.lab_angle_rad());
-        self.error_rad = self.truth_rad.map(|truth| units::angle_error(self.angle_rad, truth));
+        self.truth_rad = self.truth_rad.map(|truth| units::wrap_angle(truth + turned));
         self
     }
 
@@ -106,7 +108,8 @@ pub fn pose<'a>(
         Evidence::gather(&scene, tool, &mut report);
     }
     let angle_rad = report.lab_angle_rad();
-    let truth_rad = truth.map(|t| t.inverse().theta_rad);
+    // Of the true poses that no touch tells apart, the one nearest to the answer: errors are up to the tool's symmetry.
+    let truth_rad = truth.map(|t| Symmetry::of(tool).nearest(t, report.grasp_from_object).inverse().theta_rad);
     Ok(PoseResult {
         grasp_from_object: report.grasp_from_object,
         middle_x_m: tool.middle_x_m,

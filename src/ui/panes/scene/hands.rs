@@ -10,7 +10,6 @@ use crate::app::workbench::{ManualTry, SceneTool};
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{SMALL, caption};
 use touch2touch_core::frames::PlanarPose;
-use touch2touch_core::manual::PoseDifference;
 use touch2touch_core::units;
 
 /// The keys that move the tool in hand.
@@ -43,7 +42,7 @@ pub(super) fn strip(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: R
             ui.set_clip_rect(place.intersect(ui.clip_rect()));
             ui.spacing_mut().item_spacing = vec2(4.0, 1.0);
             let mut text = place_text(pose);
-            if let Some(off) = off_truth(cx.state, pose) {
+            if let Some(off) = results::off_truth(cx.state, pose) {
                 let (angle, position) = (units::text_deg(off.angle_rad), units::text_mm(off.position_m));
                 text += &format!("   (error {angle}, {position})");
             }
@@ -97,9 +96,4 @@ fn cost_text(cx: &Cx<'_>, hand: Option<&ManualTry>) -> (String, Color32) {
     };
     let better = hand.cost.zip(hand.began_cost).is_some_and(|(a, b)| a.cost_m2 <= b.cost_m2);
     (text, if better { cx.p.good } else { cx.p.caution })
-}
-
-/// Difference of a pose from the truth.
-pub(super) fn off_truth(state: &State, pose: PlanarPose) -> Option<PoseDifference> {
-    Some(PoseDifference::between(pose, results::truth(state)?))
 }

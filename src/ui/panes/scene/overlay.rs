@@ -45,11 +45,9 @@ pub(super) fn step_text(cx: &Cx<'_>, source: ImprintSource) -> Option<(String, C
     }
     let angle = units::wrap_angle(-shown.step.grasp_from_object.theta_rad);
     let (mut text, mut color) = (units::text_deg(angle), cx.p.strong);
-    if let Some(truth) = results::truth(cx.state) {
-        let truth = units::wrap_angle(-truth.theta_rad);
-        let error = units::angle_error(angle, truth);
-        text += &format!(" (true {}, error {})", units::text_deg(truth), units::text_deg(error));
-        color = error_color(cx.p, error);
+    if let Some(off) = results::off_truth(cx.state, shown.step.grasp_from_object) {
+        text += &format!(" (error {})", units::text_deg(off.angle_rad));
+        color = error_color(cx.p, off.angle_rad);
     }
     let last = shown.inspection.num_steps(shown.run).saturating_sub(1);
     let details = format!(

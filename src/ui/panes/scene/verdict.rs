@@ -14,7 +14,6 @@ use crate::ui::panes::images;
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{SMALL, grade_color};
 use touch2touch_core::align::MIN_POINTS;
-use touch2touch_core::manual::PoseDifference;
 use touch2touch_core::sample::Scale;
 use touch2touch_core::units;
 
@@ -110,8 +109,7 @@ fn said(cx: &Cx<'_>, source: ImprintSource, wide: bool) -> (String, Color32, Vec
                 details.extend(verdict.against.iter().skip(1).map(|sign| format!("{}: {}", sign.grade, sign.what)));
             }
             details.push(format!("{}, {}", pose_details(pose), pose_time(pose)));
-            if let Some(truth) = results::truth(state) {
-                let off = PoseDifference::between(pose.grasp_from_object, truth);
+            if let Some(off) = results::off_truth(state, pose.grasp_from_object) {
                 let both = difference("off by", "", off);
                 if wide {
                     text += &format!(" · {both}");
@@ -140,7 +138,7 @@ fn said(cx: &Cx<'_>, source: ImprintSource, wide: bool) -> (String, Color32, Vec
     let mut text = text;
     if let Some(pose) = results::by_hand(state, source) {
         text = format!("By hand: {} · {text}", hands::place_text(pose));
-        if let Some(off) = hands::off_truth(state, pose) {
+        if let Some(off) = results::off_truth(state, pose) {
             details.push(difference("Pose by hand: error", "", off));
         }
     }

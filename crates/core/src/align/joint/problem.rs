@@ -436,9 +436,21 @@ impl<'a> Problem<'a> {
         let winner = found.min_by(|a, b| runs[*a].cost.total_cmp(&runs[*b].cost)).filter(|run| runs[*run].cost < limit);
         let told = winner.map(|run| (run, descents.told(runs[run].state)));
         let told = told.filter(|(_, (explained, _))| !self.predicted || *explained >= PREDICTED_EXPLAINED);
-        let Some((winner, (explained, noise_m))) = told else {
+        // Of equal answers the one that is turned least; where that is the answer in the prior, it stays as it was.
+        let upright = told.map(|(winner, _)| {
+            let pose = runs[winner].state.to_pose(self.centroid);
+            State::from_pose(Symmetry::of(self.tool).nearest(pose, PlanarPose::default()), self.centroid)
+        });
+        let stays = upright.zip(known).is_some_and(|(upright, known)| alike(&upright, &known));
+        let Some(((winner, (explained, noise_m)), upright)) = told.zip(upright).filter(|_| !stays) else {
             return at_hand.map(|report| AlignReport { ends, ..report });
         };
+        if !alike(&upright, &runs[winner].state) {
+            let iterations = runs[winner].iterations;
+            runs[winner] = Progress::new(upright);
+            self.settle(&mut descents, winner, &mut runs[winner], weight);
+            runs[winner].iterations += iterations;
+        }
         let fit = self.fit(noise_m, weight, explained);
         let (starts, points) = (starts.iter().map(|at| at.to_pose(self.centroid)).collect(), descents.points());
         let (lookups, trace) = (descents.lookups, descents.trace);
