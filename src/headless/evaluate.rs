@@ -139,7 +139,8 @@ fn setup(args: &EvaluateArgs, dataset: &Dataset) -> anyhow::Result<Setup> {
     } else {
         args.bundles.iter().map(Origin::from).collect()
     };
-    if generators.is_empty() {
+    let gel = dataset.rig.is_gel();
+    if generators.is_empty() && !gel {
         let refused: Vec<String> = problems.iter().map(|p| format!("\n- {}: {}", p.file.display(), p.what)).collect();
         anyhow::bail!(
             "no generator bundle for {} was found; name one with --bundle{}",
@@ -157,7 +158,8 @@ fn setup(args: &EvaluateArgs, dataset: &Dataset) -> anyhow::Result<Setup> {
     let recipe = Recipe { shift, mask, mask_model, hand, registration, engine, ..Recipe::default() };
     Ok(Setup {
         bundles: generators,
-        classifier: first(&args.classifier, |b| b.tool_classifier().is_some()),
+        classifier: first(&args.classifier, |b| b.tool_classifier().is_some())
+            .filter(|_| args.classifier.is_some() || !gel),
         recipe,
         steps: args.steps,
         seed: args.seed,

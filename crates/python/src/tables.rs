@@ -69,8 +69,10 @@ impl Scores {
     }
 }
 
-fn take(kind: BundleKind, all: &[BundleInfo]) -> Option<Origin> {
-    all.iter().find(|bundle| bundle.kind == kind && !bundle.is_own()).map(|bundle| bundle.origin.clone())
+fn take(kind: BundleKind, all: &[BundleInfo], rig: &Rig) -> Option<Origin> {
+    all.iter()
+        .find(|bundle| bundle.kind == kind && !bundle.is_own() && bundle.fits(rig))
+        .map(|bundle| bundle.origin.clone())
 }
 
 /// Scores every grasp of a data set, or of a part of one, by each generator, beside the measured imprints: the function behind
@@ -96,12 +98,12 @@ pub(crate) fn evaluate(
     let data = dataset_of(py, data)?;
     let whole = given_or(py, recipe, "measured")?;
     let evaluation = watched(py, progress, |process, cx| {
-        let all = found::find(&[]).bundles;
+        let (all, rig) = (found::find(&[]).bundles, &data.get().opened.source.rig);
         let named = bundles.map(|folders| folders.iter().map(Origin::from).collect::<Vec<_>>());
-        let bundles = named.unwrap_or_else(|| take(BundleKind::Generator, &all).into_iter().collect());
+        let bundles = named.unwrap_or_else(|| take(BundleKind::Generator, &all, rig).into_iter().collect());
         let setup = Setup {
             bundles,
-            classifier: take(BundleKind::Classifier, &all),
+            classifier: take(BundleKind::Classifier, &all, rig),
             recipe: Whole { generator: None, ..whole },
             steps,
             seed,

@@ -146,7 +146,7 @@ pub fn evaluated(state: &State) -> impl Iterator<Item = (&BundleInfo, bool)> {
 pub(crate) fn evaluation_setup(state: &State) -> Option<Setup> {
     state.library.open.as_ref()?;
     let bundles: Vec<_> = evaluated(state).filter(|(_, chosen)| *chosen).map(|(b, _)| b.origin.clone()).collect();
-    (!bundles.is_empty()).then(|| Setup {
+    (!bundles.is_empty() || state.rig().is_gel()).then(|| Setup {
         bundles,
         classifier: recipe::bundle(state, BundleKind::Classifier).ok().map(|b| b.origin.clone()),
         recipe: Recipe { generator: None, ..recipe::in_force(state, ImprintSource::Measured) },

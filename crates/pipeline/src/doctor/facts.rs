@@ -237,7 +237,7 @@ fn drawn(dataset: &Dataset, masks: &DrawnMasks<'_>, posed: bool, models: &BTreeM
     let fact = Fact::plain(Topic::Masks, text);
     let usable = |tool: &String| matches!(models.get(tool), Some(Cad::Usable));
     let pairs = dataset.index.pairs.iter().filter(|pair| pair.tool.as_ref().is_some_and(usable)).count();
-    if posed && pairs > 1 && dataset.kind != SourceKind::Demo {
+    if posed && pairs > 1 && dataset.kind != SourceKind::Demo && !dataset.rig.is_gel() {
         let text = format!("{}; could be made from CAD and true poses for {}", fact.text, counted(pairs, "pair"));
         return Fact { text, ..fact }.with_cure(Cure::TrainFromCad { pairs });
     }

@@ -142,9 +142,9 @@ impl BundleInfo {
         self.fit()?.misgiving(sample)
     }
 
-    /// True where it can be used with the sensors of `rig`.
+    /// True where it can be used with the sensors of `rig`. Contact and tools are found in imprints of membranes.
     pub fn fits(&self, rig: &Rig) -> bool {
-        self.ends(rig).is_none_or(|ends| ends.is_ok())
+        self.ends(rig).map_or_else(|| !rig.is_gel(), |ends| ends.is_ok())
     }
 
     /// Opens it again. It must still be the same: its identity is part of every recipe.
@@ -206,12 +206,7 @@ impl FoundBundles {
         first.cloned().ok_or_else(|| {
             let refused: Vec<String> =
                 self.problems.iter().map(|p| format!("\n- {}: {}", p.file.display(), p.what)).collect();
-            let why = match kind {
-                BundleKind::Generator => {
-                    format!("no generator bundle for {} was found{}", rig.name, refused.concat())
-                }
-                _ => format!("no {} bundle was found{}", kind.name(), refused.concat()),
-            };
+            let why = format!("no {} bundle for {} was found{}", kind.name(), rig.name, refused.concat());
             TaskError::new(what, why).with_hint("Name one with an option, or put it into a folder of bundles.")
         })
     }

@@ -25,6 +25,7 @@ use touch2touch_core::grid::{DepthMap, Grid};
 use touch2touch_core::pose::ToolModel;
 use touch2touch_core::rig::{PadId, PerPad};
 use touch2touch_core::sample::{Sample, Scale};
+use touch2touch_core::verdict::Verdict;
 use touch2touch_core::which_tool::{Candidate, which_tool};
 
 /// A pair with what is known of it.
@@ -272,7 +273,12 @@ impl Estimate {
         let part = pressed_in(sample, tool);
         let of = part.as_ref().unwrap_or(tool);
         let contacts = Contacts { points: self.points().map_err(Clone::clone)?, images: &self.images(sample) };
-        let found = pose(contacts, of, registration, ask, sample.grasp_from_object)?;
+        let mut found = pose(contacts, of, registration, ask, sample.grasp_from_object)?;
+        if part.is_some() {
+            // A gel has no membrane that could be missing.
+            found.report.joint = None;
+            found.verdict = Verdict::of(&found.report);
+        }
         Ok(PoseResult { middle_x_m: tool.middle_x_m, ..found })
     }
 

@@ -160,12 +160,20 @@ pub enum MaskRecipe {
 }
 
 impl MaskRecipe {
-    /// The recipe on touches of this rig: a gel gives way by a tenth of what a membrane does, so that the threshold that goes
-    /// without saying is its own.
+    /// The recipe on touches of this rig: a gel gives way by a tenth of what a membrane does, so that the lengths that go
+    /// without saying are its own.
     #[must_use]
     pub(super) fn on(self, rig: &Rig) -> Self {
-        let unsaid = self == Self::Threshold(MaskChoice::UNNAMED.threshold_m.into());
-        if unsaid && rig.is_gel() { Self::Threshold(contact::GEL_CONTACT_M.into()) } else { self }
+        let unsaid = MaskChoice::UNNAMED;
+        match self {
+            Self::Threshold(m) if rig.is_gel() && m.get() == unsaid.threshold_m => {
+                Self::Threshold(contact::GEL_CONTACT_M.into())
+            }
+            Self::Cad(m) if rig.is_gel() && m.get() == unsaid.cad_distance_m => {
+                Self::Cad(contact::GEL_CONTACT_M.into())
+            }
+            same => same,
+        }
     }
 
     /// Provenance of the pixels of its masks; `model` is the mask model's name, and `basis` what a mask is made of in

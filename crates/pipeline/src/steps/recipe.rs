@@ -253,7 +253,9 @@ impl Recipe {
     /// # Errors
     /// If it takes a mask model and there is none.
     pub fn mask_recipe(&self, rig: &Rig) -> Result<MaskRecipe, TaskError> {
-        let recipe = self.mask.recipe(self.mask_model.as_ref().map(|model| &model.id)).ok_or_else(no_mask_model)?;
+        let auto_on_gel = rig.is_gel() && self.mask.source == MaskSource::Auto;
+        let model = self.mask_model.as_ref().filter(|_| !auto_on_gel).map(|model| &model.id);
+        let recipe = self.mask.recipe(model).ok_or_else(no_mask_model)?;
         Ok(recipe.on(rig))
     }
 }

@@ -82,7 +82,8 @@ impl SensorPair {
     }
 
     /// Sensors of `rig` at which the generator named `bundle` starts and ends: the sensor that it starts from must be
-    /// there as it was declared, and the sensor that it predicts must not be there as another.
+    /// there as it was declared, and the sensor that it predicts must not be there as another, nor another in its place:
+    /// predictions would be compared with that one.
     ///
     /// # Errors
     /// [`Misfit`] says what was asked, what is there and what would fit.
@@ -90,8 +91,10 @@ impl SensorPair {
         let at = |wanted: &SensorSpec| rig.sensor_of_key(&wanted.key);
         let same = |id: SensorId, wanted: &SensorSpec| rig.sensor(id).map(SensorSpec::of).as_ref() == Some(wanted);
         let output = at(&self.output);
+        let in_its_place = |sensor: &Sensor| sensor.kind == self.output.kind && sensor.key != self.input.key;
+        let free = output.is_some() || !rig.sensors.iter().any(in_its_place);
         match at(&self.input).filter(|id| same(*id, &self.input)) {
-            Some(input) if output.is_none_or(|id| same(id, &self.output)) => Ok(Ends { input, output }),
+            Some(input) if free && output.is_none_or(|id| same(id, &self.output)) => Ok(Ends { input, output }),
             _ => Err(Misfit {
                 bundle: bundle.to_owned(),
                 sensors: Box::new(self.clone()),
@@ -126,6 +129,8 @@ mod tests {
         assert_eq!(back.ends("b", &rig), Ok(Ends { input: lab::BUBBLE_ID, output: Some(lab::GELSLIM_ID) }));
         rig.sensors[1].width = 100;
         assert!(pair.ends("b", &rig).is_err() && back.ends("b", &rig).is_err());
+        rig.sensors[1] = lab::GELSLIM_DEPTH.clone();
+        assert!(pair.ends("b", &rig).is_err(), "no imprint of a bubble is a gel's");
         rig.sensors.truncate(1);
         assert_eq!(pair.ends("b", &rig), Ok(Ends { input: lab::GELSLIM_ID, output: None }));
         rig.sensors[0].key = "digit".into();
