@@ -187,14 +187,14 @@ impl SceneRenderer {
                 };
                 floor.throw(&mut encoder, &self.pipelines, &shown.casters, draw);
             }
-            let whole = Pass { clear: Some(shown.background), with_depth: true, last: true };
+            let whole = Pass { clear: Some(shown.background), writes_depth: true, last: true };
             if let Some((_, depth)) = self.depth.as_ref().filter(|_| shown.eye_dome) {
                 let until = |layer: Layer| shown.order.partition_point(|(of, _)| *of < layer);
                 let (meshes, rest) = shown.order.split_at(until(Layer::Points));
                 let (points, over) = rest.split_at(until(Layer::Outline) - meshes.len());
                 self.draw_layers(&mut target.begin(&mut encoder, Pass { last: false, ..whole }), meshes);
                 let shade = |encoder: &mut wgpu::CommandEncoder, pipeline, last| {
-                    let mut pass = target.begin(encoder, Pass { clear: None, with_depth: false, last });
+                    let mut pass = target.begin(encoder, Pass { clear: None, writes_depth: false, last });
                     pass.set_pipeline(pipeline);
                     pass.set_bind_group(0, &self.view_bindings, &[]);
                     pass.set_bind_group(1, depth, &[]);
