@@ -33,6 +33,8 @@ struct Varying {
     // Pixels.
     @location(2) @interpolate(flat) radius: f32,
     @location(3) @interpolate(flat) to_eye: vec3<f32>,
+    // 1 = a bead, 0 = a disc.
+    @location(4) @interpolate(flat) bead: u32,
 }
 
 @vertex
@@ -49,23 +51,21 @@ fn vs_main(@builtin(vertex_index) index: u32) -> Varying {
     if clip.w <= 0.0 {
         return out;
     }
-    var diameter = cloud.size * view.unit_px;
-    if cloud.size_in_meters != 0u {
-        diameter = cloud.size * view.px_per_m / clip.w;
-    }
+    // All is chosen without a branch: where a branch needs uniforms alone, Mesa's software driver compiles the shader anew at
+    // every drawing and keeps each copy, 0.4 MB.
+    let in_meters = cloud.size * view.px_per_m / clip.w;
+    let diameter = select(cloud.size * view.unit_px, in_meters, cloud.size_in_meters != 0u);
     // Below one pixel a disc would vanish between the samples.
     let radius = max(0.5 * diameter, 0.5);
     out.to_eye = towards_eye(in_world.xyz);
     out.corner = quad_corner(vertex);
     out.clip = offset_px(clip, out.corner * radius);
     out.radius = radius;
-    if cloud.color_mode == 0u {
-        out.color = unpack4x8unorm(point.payload) * vec4<f32>(1.0, 1.0, 1.0, cloud.color.a);
-    } else if cloud.color_mode == 1u {
-        out.color = vec4<f32>(scalar_color(cloud.map, point.payload, cloud.lo, cloud.hi), cloud.color.a);
-    } else {
-        out.color = cloud.color;
-    }
+    let one = cloud.color_mode == 2u;
+    out.bead = u32(one & (radius > 1.25));
+    let mapped = scalar_color(cloud.map, point.payload, cloud.lo, cloud.hi);
+    let own = select(mapped, unpack4x8unorm(point.payload).rgb, cloud.color_mode == 0u);
+    out.color = vec4<f32>(select(own, cloud.color.rgb, one), cloud.color.a);
     return out;
 }
 
@@ -75,7 +75,7 @@ fn fs_main(in: Varying) -> @location(0) vec4<f32> {
     if in.radius > 1.25 && dot(in.corner, in.corner) > 1.0 {
         discard;
     }
-    if cloud.color_mode == 2u && in.radius > 1.25 {
+    if in.bead != 0u {
         // A color that says nothing but which cloud it is may be shaded: a bead instead of a disc.
         let up = view.up_in_world.xyz;
         let depth = sqrt(max(1.0 - dot(in.corner, in.corner), 0.0));

@@ -30,11 +30,8 @@ fn diverging(t: f32) -> vec3<f32> {
 
 fn map_color(map: u32, unit: f32) -> vec3<f32> {
     let t = clamp(unit, 0.0, 1.0);
-    switch map {
-        case MAP_VIRIDIS: { return viridis(t); }
-        case MAP_DIVERGING: { return diverging(t); }
-        default: { return vec3<f32>(t); }
-    }
+    let others = select(vec3<f32>(t), diverging(t), map == MAP_DIVERGING);
+    return select(others, viridis(t), map == MAP_VIRIDIS);
 }
 
 // The color of a value given by its bits: drivers may assume that floats are numbers, so NaN is found in the bits.
@@ -43,10 +40,7 @@ fn scalar_color(map: u32, bits: u32, lo: f32, hi: f32) -> vec3<f32> {
         return NAN_COLOR;
     }
     let span = hi - lo;
-    if !(span > 0.0) {
-        return map_color(map, 0.5);
-    }
-    return map_color(map, (bitcast<f32>(bits) - lo) / span);
+    return map_color(map, select(0.5, (bitcast<f32>(bits) - lo) / span, span > 0.0));
 }
 
 fn linear_from_srgb(c: vec3<f32>) -> vec3<f32> {

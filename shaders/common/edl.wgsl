@@ -12,6 +12,9 @@ const NEIGHBORS: i32 = 8;
 const HOLLOWS_M: array<f32, 3> = array<f32, 3>(0.0012, 0.0035, 0.009);
 const HOLLOWS: i32 = 3;
 const LINES: i32 = 4;
+// Cosine and sine of the angles between two lines, and between the first lines of two sizes: 45 and 15 degrees.
+const TO_NEXT_LINE: vec2<f32> = vec2<f32>(0.70710678, 0.70710678);
+const TO_NEXT_SIZE: vec2<f32> = vec2<f32>(0.96592583, 0.25881905);
 // Furthest that one looks on the screen, pixels.
 const FAR_PX: f32 = 90.0;
 // Darkness of a deep hollow.
@@ -32,22 +35,14 @@ fn meters_behind(own: f32, other: f32) -> f32 {
     return select(0.0, max(meters_of(own) - meters_of(other), 0.0), other > 0.0);
 }
 
-// The way to the ends of line i in a hollow of size j, pixels. Each size has its own directions.
-fn ends_px(own: f32, j: i32, i: i32) -> vec2<f32> {
-    // In a parallel view all depths have the same scale.
-    let w = select(1.0, meters_of(own), view.depth.z == 0.0);
-    var sizes = HOLLOWS_M;
-    let far = clamp(sizes[j] * px_per_m_at(w), 1.5, FAR_PX * view.unit_px);
-    let angle = (f32(i) + f32(j) / f32(HOLLOWS)) * (3.14159265 / f32(LINES));
-    return far * vec2<f32>(cos(angle), sin(angle));
+// A way on the screen, turned by an angle of this cosine and sine.
+fn turned(way: vec2<f32>, by: vec2<f32>) -> vec2<f32> {
+    return vec2<f32>(way.x * by.x - way.y * by.y, way.x * by.y + way.y * by.x);
 }
 
-// Depth of the hollow of size j at a pixel between two others, as a share of its size. Something far in front is no wall of
-// it, and where nothing is the way is open.
-fn hollow(own: f32, one: f32, other: f32, j: i32) -> f32 {
-    var sizes = HOLLOWS_M;
-    let size = sizes[j];
-    let m = meters_of(own);
+// Depth of a hollow of a size, so many meters from the eye, between two other depths, as a share of its size. Something far in
+// front is no wall of it, and where nothing is the way is open.
+fn hollow(m: f32, one: f32, other: f32, size: f32) -> f32 {
     let a = select(-size, clamp(m - meters_of(one), -size, 4.0 * size), one > 0.0);
     let b = select(-size, clamp(m - meters_of(other), -size, 4.0 * size), other > 0.0);
     let wall = max(a, b);
@@ -91,12 +86,21 @@ fn fs_hollows(@builtin(position) at: vec4<f32>) -> @location(0) vec4<f32> {
     if own <= 0.0 {
         discard;
     }
+    let m = meters_of(own);
+    // In a parallel view all depths have the same scale.
+    let px_per_m = px_per_m_at(select(1.0, m, view.depth.z == 0.0));
+    var sizes = HOLLOWS_M;
     var hollows = 0.0;
+    // Each size has its own directions.
+    var first = vec2<f32>(1.0, 0.0);
     for (var j = 0; j < HOLLOWS; j++) {
+        let size = sizes[j];
+        var way = first * clamp(size * px_per_m, 1.5, FAR_PX * view.unit_px);
         for (var i = 0; i < LINES; i++) {
-            let way = ends_px(own, j, i);
-            hollows += hollow(own, depth_at(inside(at.xy + way)), depth_at(inside(at.xy - way)), j);
+            hollows += hollow(m, depth_at(inside(at.xy + way)), depth_at(inside(at.xy - way)), size);
+            way = turned(way, TO_NEXT_LINE);
         }
+        first = turned(first, TO_NEXT_SIZE);
     }
     return shade_hollows(hollows);
 }

@@ -4,9 +4,9 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DVec3, DVec4};
 
-use super::buffer::Item;
+use super::buffer::{Elements, Item};
 use super::edges::{EdgeData, EdgeStyle};
 use super::pipelines::Pipelines;
 use super::vertex::{CREASE_RAD, MeshVertex, drawable, place};
@@ -94,11 +94,13 @@ pub(super) struct MeshUniform {
 pub(super) struct MeshData {
     /// By revision.
     item: Item<(u64, Shading), MeshUniform>,
+    /// The corners of its triangles among the vertices.
+    corners: Elements,
     edges: Option<EdgeData>,
 }
 
 impl MeshData {
-    /// Uploads what changed since `old`. Returns whether vertices were uploaded, and whether numbers were.
+    /// Uploads what changed since `old`; `eye` is in the world, as the view has it. Returns whether vertices were uploaded, and whether numbers were.
     ///
     /// # Errors
     /// [`GpuError::TooLarge`].
@@ -107,20 +109,33 @@ impl MeshData {
         pipelines: &Pipelines,
         old: Option<Self>,
         item: &MeshItem,
+        eye: DVec4,
     ) -> Result<(Self, [bool; 2]), GpuError> {
         let wanted = (item.revision, item.shading);
-        let (old, old_edges) = old.map_or((None, None), |data| (Some(data.item), data.edges));
+        let (old, old_edges, mut corners) =
+            old.map_or((None, None, None), |data| (Some(data.item), data.edges, Some(data.corners)));
         let (on, label) = ((gpu, pipelines), ["Mesh", &item.name]);
-        let corners = || vertices(&item.mesh, item.shading, &item.values);
-        let (mut data, uploaded) = Item::upload(on, label, old, wanted, wgpu::BufferUsages::VERTEX, corners)?;
+        let mut order = Vec::new();
+        let distinct = || {
+            let (vertices, corners) = shared(&vertices(&item.mesh, item.shading, &item.values));
+            order = corners;
+            vertices
+        };
+        let (mut data, uploaded) = Item::upload(on, label, old, wanted, wgpu::BufferUsages::VERTEX, distinct)?;
+        let corners = match corners.take_if(|_| !uploaded) {
+            Some(corners) => corners,
+            None => {
+                let old = corners.map(|old| old.buffer);
+                Elements::upload(gpu, "Mesh::corners", &order, wgpu::BufferUsages::INDEX, old)?
+            }
+        };
         let style = &item.style;
         let [r, g, b] = style.color;
-        let world_from_mesh = view::matrix(&style.world_from_mesh);
         let range = drawable(style.range);
         let written = data.uniform.set(
             gpu,
             MeshUniform {
-                world_from_mesh,
+                world_from_mesh: view::matrix(&style.world_from_mesh),
                 color: [r, g, b, style.opacity.clamp(0.0, 1.0)],
                 xray: u32::from(style.look == Look::XRay),
                 scalar: u32::from(!item.values.is_empty()),
@@ -133,18 +148,20 @@ impl MeshData {
         let mut edges = None;
         if let Some(style) = &style.edges {
             let what = (item.name.as_str(), item.revision, &*item.mesh);
-            let (data, [list, numbers]) = EdgeData::update(gpu, pipelines, old_edges, what, (world_from_mesh, style))?;
+            let how = (&item.style.world_from_mesh, style);
+            let (data, [list, numbers]) = EdgeData::update(gpu, pipelines, old_edges, what, how, eye)?;
             edges = Some(data);
             did = [did[0] | list, did[1] | numbers];
         }
-        Ok((Self { item: data, edges }, did))
+        Ok((Self { item: data, corners, edges }, did))
     }
 
     /// Draws with the view bound to group 0.
     pub(super) fn draw(&self, pass: &mut wgpu::RenderPass<'_>) {
         pass.set_bind_group(1, &self.item.bindings, &[]);
         pass.set_vertex_buffer(0, self.item.elements.buffer.slice(..));
-        pass.draw(0..self.item.elements.count, 0..1);
+        pass.set_index_buffer(self.corners.buffer.slice(..), wgpu::IndexFormat::Uint32);
+        pass.draw_indexed(0..self.corners.count, 0, 0..1);
     }
 
     /// Draws its edges with the view bound to group 0.
@@ -153,6 +170,20 @@ impl MeshData {
             edges.draw(pass);
         }
     }
+}
+
+/// The distinct ones of some vertices, and the place of each among them: a smooth surface has a sixth as many as corners, and
+/// each is moved to the screen once.
+fn shared(corners: &[MeshVertex]) -> (Vec<MeshVertex>, Vec<u32>) {
+    let (mut distinct, mut place_of) = (Vec::new(), HashMap::new());
+    let place = |vertex: &MeshVertex| {
+        *place_of.entry(bytemuck::cast::<_, [u32; 8]>(*vertex)).or_insert_with(|| {
+            distinct.push(*vertex);
+            distinct.len() as u32 - 1
+        })
+    };
+    let order = corners.iter().map(place).collect();
+    (distinct, order)
 }
 
 /// The corners of all triangles with their normals, three per triangle.
@@ -222,6 +253,15 @@ mod tests {
             assert_eq!(t[0].normal, t[1].normal);
             assert_eq!(t[0].normal, t[2].normal);
         }
+    }
+
+    #[test]
+    fn corners_that_are_alike_are_one_vertex() {
+        let corners = vertices(&tube(24), Shading::Smooth, &[]);
+        let (distinct, order) = shared(&corners);
+        assert_eq!((distinct.len(), order.len()), (24 * 2, 24 * 6));
+        assert!(order.iter().zip(&corners).all(|(at, corner)| distinct[*at as usize] == *corner));
+        assert_eq!(shared(&vertices(&tube(4), Shading::Smooth, &[])).0.len(), 4 * 4);
     }
 
     #[test]

@@ -39,7 +39,7 @@ pub struct Pipelines {
     pub(super) lines: wgpu::RenderPipeline,
     /// Hidden by nothing.
     pub(super) lines_overlay: wgpu::RenderPipeline,
-    /// Darkens what lies behind its neighbors; reads the depth and so has none.
+    /// Darkens what lies behind its neighbors; reads the depth and so writes none.
     pub(super) edl: wgpu::RenderPipeline,
     /// Darkens what lies in a hollow, the same way.
     pub(super) hollows: wgpu::RenderPipeline,
@@ -85,8 +85,8 @@ enum Depth {
     Equals,
     /// Neither, in a pass that has it.
     Ignores,
-    /// None: its pass has no depth.
-    Absent,
+    /// Draws where there is something, and may read how deep that is.
+    Covered,
 }
 
 impl Pipelines {
@@ -138,7 +138,7 @@ impl Pipelines {
             let edge = Variant { label: "Edges::pipeline", module: &edges, ..over };
             let line = Variant { label: "Lines::pipeline", module: &lines, ..over };
             let screen = Variant { label: "Edl::pipeline", module: &edl, item_layout: &depth_layout, ..pulled };
-            let screen = Variant { blend: true, depth: Depth::Absent, ..screen };
+            let screen = Variant { blend: true, depth: Depth::Covered, stencil: Stencil::Unused, ..screen };
             let hidden = Variant { label: "Edges::overlay", fragment: "fs_hidden", depth: Depth::Ignores, ..edge };
             Ok(Self {
                 points: build(pulled),
@@ -271,7 +271,8 @@ fn build(gpu: &Gpu, view_layout: &wgpu::BindGroupLayout, variant: &Variant<'_>) 
     let compare = match variant.depth {
         Depth::Hides | Depth::Only | Depth::Tests => wgpu::CompareFunction::GreaterEqual,
         Depth::Equals => wgpu::CompareFunction::Equal,
-        Depth::Ignores | Depth::Absent => wgpu::CompareFunction::Always,
+        Depth::Covered => wgpu::CompareFunction::Less,
+        Depth::Ignores => wgpu::CompareFunction::Always,
     };
     let depth = wgpu::DepthStencilState {
         format: DEPTH_FORMAT,
@@ -291,7 +292,7 @@ fn build(gpu: &Gpu, view_layout: &wgpu::BindGroupLayout, variant: &Variant<'_>) 
         layouts: &[view_layout, variant.item_layout],
         vertices: variant.vertices,
         target: wgpu::ColorTargetState { format: COLOR_FORMAT, blend: variant.blend.then_some(OVER), write_mask },
-        depth: (variant.depth != Depth::Absent).then_some(depth),
+        depth: Some(depth),
         samples: gpu.samples,
     }
     .build(gpu)

@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use glam::DVec3;
+use glam::{DVec3, Vec4};
 
 use super::buffer::Uniform;
 use super::floor::{Caster, Floor, FloorData};
@@ -187,14 +187,14 @@ impl SceneRenderer {
                 };
                 floor.throw(&mut encoder, &self.pipelines, &shown.casters, draw);
             }
-            let whole = Pass { clear: Some(shown.background), with_depth: true, last: true };
+            let whole = Pass { clear: Some(shown.background), writes_depth: true, last: true };
             if let Some((_, depth)) = self.depth.as_ref().filter(|_| shown.eye_dome) {
                 let until = |layer: Layer| shown.order.partition_point(|(of, _)| *of < layer);
                 let (meshes, rest) = shown.order.split_at(until(Layer::Points));
                 let (points, over) = rest.split_at(until(Layer::Outline) - meshes.len());
                 self.draw_layers(&mut target.begin(&mut encoder, Pass { last: false, ..whole }), meshes);
                 let shade = |encoder: &mut wgpu::CommandEncoder, pipeline, last| {
-                    let mut pass = target.begin(encoder, Pass { clear: None, with_depth: false, last });
+                    let mut pass = target.begin(encoder, Pass { clear: None, writes_depth: false, last });
                     pass.set_pipeline(pipeline);
                     pass.set_bind_group(0, &self.view_bindings, &[]);
                     pass.set_bind_group(1, depth, &[]);
@@ -245,10 +245,9 @@ impl SceneRenderer {
         (camera, part): (&Camera, Part),
         target: &Target,
     ) -> Result<(bool, Shown), GpuError> {
-        let mut done = Counters {
-            uniforms: u64::from(self.view.set(gpu, camera.uniform(part, scene.unit_px))),
-            ..Counters::default()
-        };
+        let view = camera.uniform(part, scene.unit_px);
+        let eye = Vec4::from_array(view.eye_in_world).as_dvec4();
+        let mut done = Counters { uniforms: u64::from(self.view.set(gpu, view)), ..Counters::default() };
         let mut count = |[uploaded, written]: [bool; 2]| {
             done.uploads += u64::from(uploaded);
             done.uniforms += u64::from(written);
@@ -267,7 +266,7 @@ impl SceneRenderer {
         }
         let mut old = std::mem::take(&mut self.meshes);
         for item in &scene.meshes {
-            let (data, did) = MeshData::update(gpu, &self.pipelines, old.remove(&item.name), item)?;
+            let (data, did) = MeshData::update(gpu, &self.pipelines, old.remove(&item.name), item, eye)?;
             count(did);
             self.meshes.insert(item.name.clone(), data);
         }

@@ -79,37 +79,27 @@ impl Target {
 
     /// Starts a pass.
     pub(super) fn begin<'e>(&self, encoder: &'e mut wgpu::CommandEncoder, pass: Pass) -> wgpu::RenderPass<'e> {
-        let (view, resolve_target, store) = match &self.multisampled {
+        let (view, resolve_target, store_color) = match &self.multisampled {
             // The samples are not needed once they are resolved.
             Some(samples) if pass.last => (samples, Some(&self.resolved_view), wgpu::StoreOp::Discard),
             Some(samples) => (samples, None, wgpu::StoreOp::Store),
             None => (&self.resolved_view, None, wgpu::StoreOp::Store),
         };
-        let color_load = pass.clear.map_or(wgpu::LoadOp::Load, |color| {
-            let [r, g, b, a] = color.map(f64::from);
-            wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a })
-        });
-        let store_depth = if pass.last { wgpu::StoreOp::Discard } else { wgpu::StoreOp::Store };
-        let depth_ops = wgpu::Operations {
-            load: if pass.clear.is_some() { wgpu::LoadOp::Clear(0.0) } else { wgpu::LoadOp::Load },
-            store: store_depth,
-        };
-        let stencil_ops = wgpu::Operations {
-            load: if pass.clear.is_some() { wgpu::LoadOp::Clear(0) } else { wgpu::LoadOp::Load },
-            store: store_depth,
-        };
+        let [r, g, b, a] = pass.clear.unwrap_or_default().map(f64::from);
+        let color = pass.clear.map(|_| wgpu::Color { r, g, b, a });
+        let store = if pass.last { wgpu::StoreOp::Discard } else { wgpu::StoreOp::Store };
         encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("Scene::pass"),
             color_attachments: &[Some(wgpu::RenderPassColorAttachment {
                 view,
                 depth_slice: None,
                 resolve_target,
-                ops: wgpu::Operations { load: color_load, store },
+                ops: ops(color, store_color),
             })],
-            depth_stencil_attachment: pass.with_depth.then_some(wgpu::RenderPassDepthStencilAttachment {
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
                 view: &self.depth,
-                depth_ops: Some(depth_ops),
-                stencil_ops: Some(stencil_ops),
+                depth_ops: pass.writes_depth.then(|| ops(pass.clear.map(|_| 0.0), store)),
+                stencil_ops: pass.writes_depth.then(|| ops(pass.clear.map(|_| 0), store)),
             }),
             ..Default::default()
         })
@@ -151,7 +141,8 @@ impl Target {
         gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| failed(e.to_string()))?;
         receive.recv().map_err(|e| failed(e.to_string()))?.map_err(|e| failed(e.to_string()))?;
         let bytes = buffer.get_mapped_range(..).map_err(|e| failed(e.to_string()))?;
-        let rgba = bytes.chunks_exact(padded as usize).flat_map(|r| &r[..row as usize]).copied().collect();
+        let mut rgba = Vec::with_capacity(bytes.len());
+        bytes.chunks_exact(padded as usize).for_each(|padded| rgba.extend_from_slice(&padded[..row as usize]));
         Ok(Picture { size: self.size, rgba })
     }
 
@@ -161,13 +152,18 @@ impl Target {
     }
 }
 
+/// What a pass does to a part of the picture at its start and end.
+fn ops<V>(clear: Option<V>, store: wgpu::StoreOp) -> wgpu::Operations<V> {
+    wgpu::Operations { load: clear.map_or(wgpu::LoadOp::Load, wgpu::LoadOp::Clear), store }
+}
+
 /// Settings of a pass over the picture.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pass {
     /// Clears everything to this color (sRGB, premultiplied) first; without one the picture goes on.
     pub clear: Option<[f32; 4]>,
-    /// True where it tests against depth.
-    pub with_depth: bool,
+    /// True where it writes depth; else its shaders may read it.
+    pub writes_depth: bool,
     /// True where the picture is finished after it.
     pub last: bool,
 }

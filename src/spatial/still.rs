@@ -12,6 +12,7 @@ use crate::gpu::{Gpu, GpuError};
 use crate::spatial::{FILLED, focus, items};
 use touch2touch_core::colormap::Range;
 use touch2touch_core::grid::Grid;
+use touch2touch_core::picture::{mean_of_squares, unmultiplied};
 use touch2touch_pipeline::compare::deviation::DISTANCE_MAP;
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::labels::ImprintSource;
@@ -192,7 +193,11 @@ impl Stills {
         // What shades a pixel from around it must not end at the border of a part.
         let margin = ((0.1 * f64::from(whole[0].min(whole[1]))).ceil() as u32).next_multiple_of(fine);
         let texture = MOST_TEXTURE_PX.min(self.gpu.device.limits().max_texture_dimension_2d);
-        let inner = (texture.saturating_sub(2 * margin).max(256) / fine) * fine;
+        // What fits is one part.
+        let inner = match whole[0].max(whole[1]) <= texture {
+            true => texture,
+            false => (texture.saturating_sub(2 * margin).max(256) / fine) * fine,
+        };
         let mut renderer = SceneRenderer::new(&self.gpu, self.pipelines.clone())?;
         let mut target = Target::new(&self.gpu, [1, 1])?;
         let mut out = Picture { size, rgba: vec![0; size[0] as usize * size[1] as usize * 4] };
@@ -222,13 +227,8 @@ impl Stills {
         let drawn = self.picture(&scene, &camera, view.size_px);
         let drawn = drawn.map_err(|err| TaskError::new("3D picture", err.to_string()))?;
         let [width, height] = drawn.size.map(|n| n as usize);
-        let pixel = |at: &[u8]| {
-            let alpha = u32::from(at[3]).max(1);
-            let own = |v: u8| (u32::from(v) * 255 / alpha).min(255) as u8;
-            [own(at[0]), own(at[1]), own(at[2]), at[3]]
-        };
-        let pixels = drawn.rgba.chunks_exact(4).map(pixel).collect();
-        let pixels = Grid::from_vec(width, height, pixels).map_err(|err| TaskError::from_error("3D picture", &err))?;
+        let pixels = Grid::from_vec(width, height, unmultiplied(&drawn.rgba));
+        let pixels = pixels.map_err(|err| TaskError::from_error("3D picture", &err))?;
         Ok(SpacePicture { pixels, px_per_m: camera.px_per_m(view.size_px) })
     }
 }
@@ -238,18 +238,13 @@ fn lay(out: &mut Picture, drawn: &Picture, part: Part, (corner, inner): ([u32; 2
     let [width, height] = out.size;
     let from = corner.map(|n| n / fine);
     let to = [(corner[0] + inner).div_ceil(fine).min(width), (corner[1] + inner).div_ceil(fine).min(height)];
-    let row = drawn.size[0] as usize * 4;
-    for (x, y) in (from[1]..to[1]).flat_map(|y| (from[0]..to[0]).map(move |x| (x, y))) {
-        let [left, top] = [x * fine - part.at[0], y * fine - part.at[1]].map(|n| n as usize);
-        let mut sum = [0_u32; 4];
-        for (i, j) in (0..fine as usize).flat_map(|j| (0..fine as usize).map(move |i| (i, j))) {
-            let at = (top + j) * row + (left + i) * 4;
-            for (sum, byte) in sum.iter_mut().zip(&drawn.rgba[at..at + 4]) {
-                *sum += u32::from(*byte);
-            }
-        }
-        let count = fine * fine;
-        let at = (y as usize * width as usize + x as usize) * 4;
-        out.rgba[at..at + 4].copy_from_slice(&sum.map(|sum| ((sum + count / 2) / count) as u8));
+    let pixels = mean_of_squares(&drawn.rgba, drawn.size[0] as usize, fine as usize);
+    let row = (drawn.size[0] / fine) as usize * 4;
+    let [left, top] = [0, 1].map(|i| (from[i] - part.at[i] / fine) as usize);
+    let bytes = (to[0] - from[0]) as usize * 4;
+    for y in from[1]..to[1] {
+        let at = (y as usize * width as usize + from[0] as usize) * 4;
+        let start = (top + (y - from[1]) as usize) * row + left * 4;
+        out.rgba[at..at + bytes].copy_from_slice(&pixels[start..start + bytes]);
     }
 }

@@ -31,6 +31,37 @@ fn toned(image: &RgbGrid, gain: f32, center: f32) -> Rgb8 {
     image.map(|p| p.map(|v| (v * gain + center).round().clamp(0.0, 255.0) as u8))
 }
 
+/// The mean of each square of `side` x `side` pixels, of a picture of four bytes per pixel whose sizes are multiples of that.
+pub fn mean_of_squares(rgba: &[u8], width: usize, side: usize) -> Vec<u8> {
+    if side == 1 {
+        return rgba.to_vec();
+    }
+    let (row, count) = (width * 4, (side * side) as u32);
+    let mut out = Vec::with_capacity(rgba.len() / (side * side));
+    for rows in rgba.chunks_exact(row * side) {
+        for left in (0..row).step_by(4 * side) {
+            let mut sum = [count / 2; 4];
+            for pixel in (0..side).flat_map(|j| rows[j * row + left..][..4 * side].chunks_exact(4)) {
+                sum.iter_mut().zip(pixel).for_each(|(sum, byte)| *sum += u32::from(*byte));
+            }
+            out.extend(sum.map(|sum| (sum / count) as u8));
+        }
+    }
+    out
+}
+
+/// Pixels with their own colors, of bytes with colors that are multiplied by the opacity.
+pub fn unmultiplied(rgba: &[u8]) -> Vec<[u8; 4]> {
+    let pixel = |at: &[u8; 4]| match u32::from(at[3]) {
+        255 => *at,
+        alpha => {
+            let own = |v: u8| (u32::from(v) * 255 / alpha.max(1)).min(255) as u8;
+            [own(at[0]), own(at[1]), own(at[2]), at[3]]
+        }
+    };
+    rgba.as_chunks().0.iter().map(pixel).collect()
+}
+
 /// The gain that spreads a difference over the gray levels: 1 at the usual contrast, more for faint touches, and for
 /// values on a 0..1 scale. 1 for an empty or constant image.
 pub(crate) fn difference_gain(image: &RgbGrid) -> f32 {
@@ -47,6 +78,17 @@ pub(crate) fn difference_gain(image: &RgbGrid) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn squares_become_their_mean_and_pixels_their_own_colors() {
+        let rgba: Vec<u8> = (0..32).map(|i| if i < 16 { 10 } else { 13 }).collect();
+        assert_eq!(mean_of_squares(&rgba, 4, 2), [12; 8], "rounded");
+        assert_eq!(mean_of_squares(&rgba, 4, 1), rgba);
+        assert_eq!(
+            unmultiplied(&[64, 0, 128, 128, 7, 8, 9, 255, 0, 0, 0, 0]),
+            [[127, 0, 255, 128], [7, 8, 9, 255], [0; 4]]
+        );
+    }
 
     #[test]
     fn a_difference_lies_around_gray() {

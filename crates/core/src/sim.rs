@@ -60,12 +60,14 @@ pub(crate) fn simulate_apart(
     config: &SimConfig,
 ) -> Sample {
     let (gelslims, bubbles) = (gelslims.object_from_grasp(), bubbles.object_from_grasp());
-    let pads = lab::PADS.map(|finger| {
+    let touch = |finger| {
         let felt = PadTouch::default()
             .with(lab::GELSLIM_ID, Some(gelslim::touch(&config.gelslim, tool, gelslims, finger, seed)));
         let membrane = Membrane::press(&config.bubble, tool, bubbles, finger);
         Some(felt.with(lab::BUBBLE_ID, Some(bubble_touch(&config.bubble, tool, &membrane, finger, seed))))
-    });
+    };
+    let [one, other] = lab::PADS;
+    let pads = <[_; 2]>::from(rayon::join(|| touch(one), || touch(other)));
     Sample { pads: pads.into(), grasp_from_object: Some(bubbles.inverse()), ..Sample::default() }
 }
 

@@ -35,7 +35,7 @@ macro_rules! table {
     ($with:ident) => {
         $with! {
         /// The tensors of a pair: about 10 MB of a lab pair (two GelSlim images and their difference, per finger).
-        Sample(PairKey => Sample, Sample::bytes) in samples, 192 * MIB;
+        Sample(PairKey => Sample, Sample::bytes) in samples, 112 * MIB;
         /// The labels stored for a pair: they go to the document.
         Labels(LabelsKey => Read);
         /// The lines about the data set.
@@ -67,7 +67,7 @@ macro_rules! table {
         /// The plan of a training of the mask model: what it would learn from.
         TrainPlan(TrainPlanKey => TrainPlan, |plan| (plan.masks() + plan.held_out[0]) * 256) in train_plans, MIB;
         /// An estimate: imprints, masks, cloud and pose as far as a pane needs them.
-        Estimate(EstimateKey => Estimate, Estimate::bytes) in estimates, 259 * MIB;
+        Estimate(EstimateKey => Estimate, Estimate::bytes) in estimates, 64 * MIB;
         /// A registration with everything recorded, ready to be looked through.
         Run(RunKey => Inspection, Inspection::bytes) in runs, 96 * MIB;
         /// Reasons, residuals and distances of a recorded registration from the registration's own starts.
