@@ -1,4 +1,4 @@
-"""Open3D and small_gicp on the contact points of `touch2touch-bench registration`.
+"""Open3D, KISS-Matcher and small_gicp on the contact points of `touch2touch-bench registration`.
 
 Called by the program as `python peers.py FOLDER`; FOLDER holds `request.json` (case and tool numbers) and
 `request.npz` (contact points of each case, grasp frame; surface points of each tool, object frame; metres).
@@ -6,7 +6,8 @@ Writes `reply.json`: per method and case the planar part of grasp_from_object an
 
 The same search for all: ten starts about the closing axis, -22.5 to 22.5 degrees in steps of 5, the contact points as
 the moving cloud, the tool's 5000 surface points as the fixed one (prepared once per tool, outside the timing), 15 mm of
-reach, at most 100 iterations; the start with the lowest cost wins. `ms` is the clock, `cpu_ms` the processor. small_gicp works in millimetres, which its
+reach, at most 100 iterations; the start with the lowest cost wins. Two search without a start: features and RANSAC, and
+KISS-Matcher. `ms` is the clock, `cpu_ms` the processor. small_gicp works in millimetres, which its
 defaults are made for.
 """
 
@@ -14,6 +15,7 @@ import json
 import math
 import sys
 import time
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -88,6 +90,63 @@ class Open3D:
         return {**planar(pose, 1.0), "ms": ms + prepared}
 
 
+class Anywhere:
+    """A search without a start, then Open3D's ICP point to plane from where it ends. In millimetres: both have steps of a metre's
+    order in mind."""
+
+    VOXEL_MM = 1.5
+    NEAR_MM = 2.5
+
+    def __init__(self, o3d, kiss=None):
+        self.o3d, self.kiss = o3d, kiss
+        self.registration = o3d.pipelines.registration
+        self.name = "kiss-matcher" if kiss else "open3d-fpfh-ransac"
+        self.label = "KISS-Matcher, then ICP" if kiss else "Open3D FPFH and RANSAC, then ICP"
+        self.tools = {}
+
+    def cloud(self, points):
+        cloud = self.o3d.geometry.PointCloud(self.o3d.utility.Vector3dVector(points * 1e3))
+        cloud = cloud.voxel_down_sample(self.VOXEL_MM)
+        cloud.estimate_normals(self.o3d.geometry.KDTreeSearchParamHybrid(2.0 * self.VOXEL_MM, 30))
+        near = self.o3d.geometry.KDTreeSearchParamHybrid(5.0 * self.VOXEL_MM, 100)
+        return cloud, None if self.kiss else self.registration.compute_fpfh_feature(cloud, near)
+
+    def prepare(self, number, points):
+        self.tools[number] = (*self.cloud(points), np.ascontiguousarray(points * 1e3))
+
+    def anywhere(self, source, features, tool):
+        target, target_features, points = tool
+        if self.kiss:
+            matcher = self.kiss.KISSMatcher(self.kiss.KISSMatcherConfig(self.VOXEL_MM))
+            found = matcher.estimate(np.asarray(source.points), points)
+            pose = np.eye(4)
+            pose[:3, :3], pose[:3, 3] = found.rotation, np.ravel(found.translation)
+            return pose
+        near = self.registration.CorrespondenceCheckerBasedOnDistance(self.NEAR_MM)
+        edges = self.registration.CorrespondenceCheckerBasedOnEdgeLength(0.9)
+        return self.registration.registration_ransac_based_on_feature_matching(
+            source,
+            target,
+            features,
+            target_features,
+            True,
+            self.NEAR_MM,
+            self.registration.TransformationEstimationPointToPoint(),
+            3,
+            [edges, near],
+            self.registration.RANSACConvergenceCriteria(100_000, 0.999),
+        ).transformation
+
+    def solve(self, number, points):
+        tool = self.tools[number]
+        begin = time.perf_counter()
+        start = self.anywhere(*self.cloud(points), tool)
+        plane = self.registration.TransformationEstimationPointToPlane()
+        source = self.o3d.geometry.PointCloud(self.o3d.utility.Vector3dVector(points * 1e3))
+        pose = self.registration.registration_icp(source, tool[0], self.NEAR_MM, start, plane).transformation
+        return {**planar(np.array(pose), 1e-3), "ms": (time.perf_counter() - begin) * 1e3}
+
+
 class SmallGicp:
     LABELS = {"ICP": "small_gicp ICP", "PLANE_ICP": "small_gicp plane ICP", "GICP": "small_gicp GICP"}
 
@@ -140,13 +199,20 @@ def methods():
         import open3d
 
         open3d.utility.set_verbosity_level(open3d.utility.VerbosityLevel.Error)
-        found += [Open3D(open3d, False), Open3D(open3d, True)]
+        found += [Open3D(open3d, False), Open3D(open3d, True), Anywhere(open3d)]
         versions["open3d"] = open3d.__version__
     except (ImportError, OSError) as error:
         missing["open3d"] = str(error)
     try:
+        import kiss_matcher
+        import open3d
+
+        found.append(Anywhere(open3d, kiss_matcher))
+        versions["kiss_matcher"] = version("kiss_matcher")
+    except (ImportError, OSError) as error:
+        missing["kiss_matcher"] = str(error)
+    try:
         import small_gicp
-        from importlib.metadata import version
 
         found += [SmallGicp(small_gicp, kind) for kind in ("ICP", "PLANE_ICP", "GICP")]
         versions["small_gicp"] = version("small_gicp")

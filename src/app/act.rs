@@ -167,10 +167,6 @@ fn can_score_all(state: &State) -> bool {
 }
 
 /// Takes a tool of the 3D panes, or puts it away.
-fn answer(state: &State, by: isize) -> Option<Command> {
-    when(workbench::answer(state, by).is_some(), WorkbenchCommand::Answer(by))
-}
-
 fn toggle(state: &State, tool: SceneTool) -> Option<Command> {
     let next = if state.workbench.tool == tool { SceneTool::Look } else { tool };
     when(state.entry().is_some(), WorkbenchCommand::SetTool(next))

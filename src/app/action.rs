@@ -168,10 +168,8 @@ macro_rules! actions {
             state => accept(state, ImprintSource::Predicted);
         PoseTool, Pose, "Pose tool", "Moves the tool by hand in the 3D panes: arrow keys, or the handles", [plain("Z")],
             state => toggle(state, SceneTool::Pose);
-        PreviousAnswer, Pose, "Previous answer", "Puts the tool at the previous of the poses that fit about as well", [alt("[")],
-            state => answer(state, -1);
         NextAnswer, Pose, "Next answer", "Puts the tool at the next of the poses that fit about as well", [alt("]")],
-            state => answer(state, 1);
+            state => when(workbench::answer(state).is_some(), WorkbenchCommand::NextAnswer);
         IcpFromHere, Pose, "Register from here", "Registers again, starting from the pose set by hand", [shift("Z")],
             state => when(in_hand(state), WorkbenchCommand::StartIcp);
         Accept, Pose, "Accept", "Closes the polygon, accepts the suggested mask, or saves the pose set by hand", [plain("Enter")],

@@ -32,8 +32,8 @@ pub enum WorkbenchCommand {
     Nudge(PoseAxis, f64),
     /// Puts the tool somewhere.
     SetHandPose(PlanarPose),
-    /// Puts the tool at another answer of the registration, so many further in their order.
-    Answer(isize),
+    /// Puts the tool at the next answer of the registration.
+    NextAnswer,
     /// Registers from where the tool is.
     StartIcp,
     /// Takes the pose over into the document.
@@ -78,8 +78,8 @@ pub(super) fn step(state: &mut State, command: WorkbenchCommand, effects: &mut V
                 put(state, |_| pose);
             }
         }
-        WorkbenchCommand::Answer(by) => {
-            if let Some(pose) = answer(state, by) {
+        WorkbenchCommand::NextAnswer => {
+            if let Some(pose) = answer(state) {
                 step(state, WorkbenchCommand::SetTool(SceneTool::Pose), effects);
                 put(state, |_| pose);
             }
@@ -91,14 +91,14 @@ pub(super) fn step(state: &mut State, command: WorkbenchCommand, effects: &mut V
     }
 }
 
-/// The pose that the touch allows as well, so many further in the order of the answers from where the tool is.
-pub(crate) fn answer(state: &State, by: isize) -> Option<PlanarPose> {
+/// The next pose that the touch allows as well, in the order of the answers from where the tool is.
+pub(crate) fn answer(state: &State) -> Option<PlanarPose> {
     let source = state.workbench.side;
     let answers = &results::pose(state, source).ready()?.report.answers;
     let held = state.workbench.hand(source).map(|hand| hand.pose).or_else(|| results::by_hand(state, source));
     let at = answers.iter().position(|answer| Some(answer.grasp_from_object) == held).unwrap_or(0);
-    let to = (at as isize + by).rem_euclid(answers.len().max(1) as isize) as usize;
-    answers.get(to).filter(|_| answers.len() > 1).map(|answer| answer.grasp_from_object)
+    let next = answers.iter().cycle().nth(at + 1).filter(|_| answers.len() > 1);
+    next.map(|answer| answer.grasp_from_object)
 }
 
 /// The cost of a pose with the contact points of an imprint; `None` while cloud or model are not there.

@@ -123,14 +123,15 @@ fn engine_row(row: Row, cases: &[Prepared], chosen: &[usize]) -> anyhow::Result<
         let case = &cases[i];
         let number = |v: Option<f64>| v.unwrap_or(f64::NAN);
         let pose = PlanarPose { theta_rad: number(answer.theta_rad), y_m: number(answer.y_m), z_m: number(answer.z_m) };
-        let error = angle_error(pose.theta_rad, case.truth.theta_rad).to_degrees();
+        let truth = case.truth_near(pose);
+        let error = angle_error(pose.theta_rad, truth.theta_rad).to_degrees();
         (error_deg[i], ms[i]) = (Some(error).filter(|e| e.is_finite()), answer.ms);
-        offset_mm[i] = answer.theta_rad.map(|_| offset(pose, case.truth));
+        offset_mm[i] = answer.theta_rad.map(|_| offset(pose, truth));
         outcomes.push(Outcome {
             stratum: case.stratum,
             straight: case.straight,
             error_deg: error,
-            position_mm: position_error_mm(pose, case.truth),
+            position_mm: position_error_mm(pose, truth),
             ms: number(answer.ms),
         });
     }

@@ -27,6 +27,7 @@ use touch2touch_core::grid::Mask;
 use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::pose::{Registration, ToolModel, register, register_with};
 use touch2touch_core::rig::Rig;
+use touch2touch_core::symmetry::Symmetry;
 use touch2touch_core::units::angle_error;
 use touch2touch_pipeline::infer::engine::EngineChoice;
 use touch2touch_pipeline::pairs;
@@ -316,6 +317,9 @@ pub(super) fn images(case: &Case) -> [PadImage<'_>; 2] {
 
 fn prepare(set: &CaseSet, masks: &[[Mask; 2]]) -> anyhow::Result<Vec<Prepared>> {
     let straight: BTreeMap<usize, bool> = set.tools.iter().map(|(&n, mesh)| (n, is_straight(mesh))).collect();
+    let symmetry = |mesh: &TriMesh| Ok::<_, anyhow::Error>(Symmetry::of(&ToolModel::new(mesh.clone())?));
+    let symmetries =
+        set.tools.iter().map(|(&n, mesh)| Ok((n, symmetry(mesh)?))).collect::<anyhow::Result<BTreeMap<_, _>>>()?;
     set.cases
         .iter()
         .zip(masks)
@@ -326,6 +330,7 @@ fn prepare(set: &CaseSet, masks: &[[Mask; 2]]) -> anyhow::Result<Vec<Prepared>> 
                 stratum: case.stratum,
                 tool: case.tool,
                 straight: straight[&case.tool],
+                symmetry: symmetries[&case.tool].clone(),
                 truth: case.grasp_from_object,
                 points,
             })
@@ -394,13 +399,17 @@ fn measure(
             let result = timed(|| register(contacts, model, engine, false));
             cpu_ms = cpu_ms.zip(thread_cpu_ms().zip(before)).map(|(sum, (after, before))| sum + after - before);
             calls += result.calls;
-            offset_mm.push(result.value.as_ref().ok().map(|r| offset(r.grasp_from_object, case.truth)));
-            outcomes.push(outcome(case, result));
-            scored.extend(
-                judged
-                    .ok()
-                    .and_then(|found| Some(scores(found.evidence.as_ref()?, found.grasp_from_object, case.truth))),
+            offset_mm.push(
+                result.value.as_ref().ok().map(|r| offset(r.grasp_from_object, case.truth_near(r.grasp_from_object))),
             );
+            outcomes.push(outcome(case, result));
+            scored.extend(judged.ok().and_then(|found| {
+                Some(scores(
+                    found.evidence.as_ref()?,
+                    found.grasp_from_object,
+                    case.truth_near(found.grasp_from_object),
+                ))
+            }));
         }
         rows.push(EngineRow {
             name: engine.to_string(),
@@ -444,8 +453,8 @@ fn outcome(case: &Prepared, timed: Timed<Result<AlignReport, AlignError>>) -> Ou
     Outcome {
         stratum: case.stratum,
         straight: case.straight,
-        error_deg: pose.map_or(f64::NAN, |p| angle_error(p.theta_rad, case.truth.theta_rad).to_degrees()),
-        position_mm: pose.map_or(f64::NAN, |p| position_error_mm(p, case.truth)),
+        error_deg: pose.map_or(f64::NAN, |p| angle_error(p.theta_rad, case.truth_near(p).theta_rad).to_degrees()),
+        position_mm: pose.map_or(f64::NAN, |p| position_error_mm(p, case.truth_near(p))),
         ms: timed.median,
     }
 }

@@ -1,5 +1,7 @@
 //! A case ready to be registered, and a row of the table of registrations.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 use serde::Serialize;
 
@@ -8,6 +10,7 @@ use super::reliability::Reliability;
 use touch2touch_bench::known::Stratum;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::manual::PoseDifference;
+use touch2touch_core::symmetry::Symmetry;
 
 /// A case ready to be registered.
 pub(super) struct Prepared {
@@ -16,8 +19,16 @@ pub(super) struct Prepared {
     pub(super) tool: usize,
     pub(super) straight: bool,
     pub(super) truth: PlanarPose,
+    pub(super) symmetry: Arc<Symmetry>,
     /// Contact points, grasp frame, meters.
     pub(super) points: Vec<DVec3>,
+}
+
+impl Prepared {
+    /// The true pose; of equal ones, by the tool's symmetry, the one nearest to another pose.
+    pub(super) fn truth_near(&self, pose: PlanarPose) -> PlanarPose {
+        self.symmetry.nearest(self.truth, pose)
+    }
 }
 
 /// One row of the table.

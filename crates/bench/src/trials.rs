@@ -20,6 +20,7 @@ mod tools;
 
 use anyhow::Context as _;
 use clap::Args;
+use glam::DVec2;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -257,7 +258,10 @@ impl Hand<'_> {
             Ok(found) => {
                 let grasp = grasp(found.grasp_from_object);
                 // Where a tool is along its own axis is no fault: it is let down along it until it meets something.
-                let grade = Verdict::let_down(&found.report).map(|verdict| verdict.grade);
+                let (pose, evidence) = (found.grasp_from_object, found.report.evidence.as_ref());
+                let across_m = evidence.map(|e| e.uncertainty.along_m(pose, DVec2::from_angle(pose.theta_rad)));
+                let verdict = across_m.and_then(|across_m| Verdict::with_place(&found.report, across_m));
+                let grade = verdict.map(|verdict| verdict.grade);
                 let tried = Tried { grade, success: self.goal.succeeds(grasp) };
                 Held { error_rad: found.error_rad.unwrap_or(f64::NAN), tried }
             }

@@ -64,12 +64,7 @@ impl TriMesh {
 
     /// True where every edge belongs to exactly two triangles, once in each direction.
     pub fn is_watertight(&self) -> bool {
-        let mut edges: Vec<(u32, u32)> = Vec::with_capacity(self.triangles.len() * 3);
-        for t in &self.triangles {
-            for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
-                edges.push((a, b));
-            }
-        }
+        let mut edges: Vec<_> = self.triangles.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]).collect();
         edges.sort_unstable();
         let unique = edges.windows(2).all(|w| w[0] != w[1]);
         unique && edges.iter().all(|&(a, b)| edges.binary_search(&(b, a)).is_ok())

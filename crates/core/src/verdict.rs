@@ -1,6 +1,5 @@
 //! [`Verdict`]: how much a registered pose can be relied on, without the truth, in words. One for every view, table and file.
 
-use glam::DVec2;
 use serde::{Deserialize, Serialize, Serializer};
 use serde_json::json;
 
@@ -10,8 +9,6 @@ use crate::units;
 
 /// Limits of a good and of a usable angle, radians: the paper's.
 const ANGLE_RAD: [f64; 2] = [5.0 / 180.0 * std::f64::consts::PI, 10.0 / 180.0 * std::f64::consts::PI];
-/// Limits of a good and of a usable place, meters: a tenth and a half of what the gripper leaves open.
-const PLACE_M: [f64; 2] = [1e-3, 5e-3];
 
 /// Grade of a pose by how much it can be relied on; a later one is worse.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -40,11 +37,6 @@ impl Grade {
     /// The grade of an error of the angle alone, radians: green, amber or red at the paper's 5 and 10 degrees.
     pub fn of_angle_error(error_rad: f64) -> Self {
         Self::of(error_rad.abs(), ANGLE_RAD)
-    }
-
-    /// The grade of a difference of poses.
-    pub fn of_difference(off: PoseDifference) -> Self {
-        Self::of_angle_error(off.angle_rad).max(Self::of(off.position_m, PLACE_M))
     }
 }
 
@@ -183,16 +175,7 @@ pub struct Sign {
 impl Verdict {
     /// The verdict on the answer of a registration; `None` unless its evidence was asked for.
     pub fn of(report: &AlignReport) -> Option<Self> {
-        let evidence = report.evidence.as_ref()?;
-        Some(Self::with_place(report, evidence, evidence.uncertainty.place_m(report.grasp_from_object)))
-    }
-
-    /// The verdict for one who lets the tool down along its own axis, z of the object frame, until it meets something: a place
-    /// that the contact leaves open along that axis is no fault then. `None` as with [`Self::of`].
-    pub fn let_down(report: &AlignReport) -> Option<Self> {
-        let (evidence, pose) = (report.evidence.as_ref()?, report.grasp_from_object);
-        let across_m = evidence.uncertainty.along_m(pose, DVec2::from_angle(pose.theta_rad));
-        Some(Self::with_place(report, evidence, across_m))
+        Self::with_place(report, report.evidence?.uncertainty.place_m(report.grasp_from_object))
     }
 
     /// `angle good (±0.3°), place uncertain (±3.20 mm)`.
@@ -203,8 +186,9 @@ impl Verdict {
         format!("angle {} (±{turn}), place {} (±{shift})", word(self.angle), word(self.place))
     }
 
-    /// The verdict, given the standard deviation of the place that counts, meters.
-    fn with_place(report: &AlignReport, evidence: &Evidence, place_m: f64) -> Self {
+    /// The verdict for one to whom only so much of the spread of the place matters, as a standard deviation, meters.
+    pub fn with_place(report: &AlignReport, place_m: f64) -> Option<Self> {
+        let evidence = report.evidence.as_ref()?;
         let mut against = signs(report, evidence, place_m);
         let worst = |part: usize| against.iter().map(|sign| sign.parts[part]).max().unwrap_or(Grade::Good);
         let angle = Part { grade: worst(0), sd: evidence.uncertainty.angle_rad() };
@@ -212,7 +196,7 @@ impl Verdict {
         against.retain(|sign| sign.grade > Grade::Good);
         against.sort_by_key(|sign| std::cmp::Reverse(sign.grade));
         let why = against.first().map_or_else(|| fits(evidence), |sign| sign.what.clone());
-        Self { grade: angle.grade.max(place.grade), angle, place, why, against }
+        Some(Self { grade: angle.grade.max(place.grade), angle, place, why, against })
     }
 }
 

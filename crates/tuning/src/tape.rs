@@ -115,12 +115,6 @@ impl Tensor {
     pub(crate) fn shared(&self) -> Arc<Vec<f32>> {
         self.values.clone()
     }
-
-    /// True where gradients follow it.
-    #[cfg(test)]
-    pub(crate) fn is_tracked(&self) -> bool {
-        self.node.is_some()
-    }
 }
 
 /// Place of the slope along an input; none, if the input is not followed.
@@ -196,11 +190,11 @@ mod tests {
     #[test]
     fn nothing_is_kept_of_what_is_not_followed() {
         let x = Tensor::new(&[2], vec![3.0, 4.0]);
-        assert!(!mul(&x, &x).is_tracked());
+        assert!(mul(&x, &x).node.is_none());
         let tape = Rc::new(Tape::default());
         let leaf = x.clone().tracked(&tape);
         let product = mul(&leaf, &x);
-        assert!(product.is_tracked() && !product.detached().is_tracked());
+        assert!(product.node.is_some() && product.detached().node.is_none());
         assert_eq!(Rc::strong_count(&tape), 2);
         assert_eq!(Arc::strong_count(&leaf.values), 4);
         drop(leaf);

@@ -58,10 +58,8 @@ impl Action {
         let look = matches!(self, A::CameraLeft | A::CameraRight | A::CameraFront | A::CameraTop)
             || matches!(self, A::CameraOblique | A::Distances)
             || matches!(self, A::Parallel | A::BothClouds);
-        look || matches!(
-            self,
-            A::PoseTool | A::PreviousAnswer | A::NextAnswer | A::IcpFromHere | A::Accept | A::RevertHand
-        ) || matches!(self, A::PlaySteps | A::PaintIn3d | A::PaintLayers)
+        look || matches!(self, A::PoseTool | A::NextAnswer | A::IcpFromHere | A::Accept | A::RevertHand)
+            || matches!(self, A::PlaySteps | A::PaintIn3d | A::PaintLayers)
     }
 
     /// True where it is about the steps of a registration.

@@ -469,7 +469,7 @@ draws! {
         1 SetSide(source()),
         1 Nudge(any_of::<PoseAxis>(), number().prop_map(f64::from)),
         1 SetHandPose(planar()),
-        1 Answer(-3isize..4),
+        1 NextAnswer,
         1 StartIcp,
         1 AcceptHand,
         1 RevertHand,

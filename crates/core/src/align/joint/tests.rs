@@ -297,7 +297,7 @@ fn a_place_open_along_the_tool_is_no_fault_where_it_is_let_down_along_itself() {
         let uncertainty = spread_along(pose, [along_m, across_m]);
         assert!((uncertainty.along_m(pose, DVec2::from_angle(pose.theta_rad)) - across_m).abs() < 1e-9);
         report.evidence = Some(Evidence { uncertainty, ..evidence });
-        [Verdict::of(&report), Verdict::let_down(&report)].map(Option::unwrap)
+        [Verdict::of(&report), Verdict::with_place(&report, across_m)].map(Option::unwrap)
     };
     let [held, let_down] = graded(3e-3, 1e-4);
     assert_eq!((held.grade, let_down.grade), (Grade::Check, Grade::Good));
