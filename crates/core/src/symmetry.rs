@@ -9,7 +9,7 @@ use super::frames::PlanarPose;
 use super::mesh::sampling::spread;
 use super::tent::{Sheet, heights};
 use super::tool::ToolModel;
-use super::units::angle_error;
+use super::units::{angle_error, wrap_angle};
 
 /// Parts of a full turn that are tried; a model that the finest one takes to itself is round.
 const PARTS: [u32; 6] = [2, 3, 4, 5, 6, 36];
@@ -64,7 +64,11 @@ impl Symmetry {
 
     /// The poses, `grasp_from_object`, that no touch tells apart from this one, itself first.
     pub fn alike(&self, grasp_from_object: PlanarPose) -> impl Iterator<Item = PlanarPose> {
-        std::iter::once(grasp_from_object).chain(self.turns.iter().map(move |turn| grasp_from_object.compose(*turn)))
+        let turned = self.turns.iter().map(move |turn| {
+            let pose = grasp_from_object.compose(*turn);
+            PlanarPose { theta_rad: wrap_angle(pose.theta_rad), ..pose }
+        });
+        std::iter::once(grasp_from_object).chain(turned)
     }
 
     /// Of these the one whose angle is nearest to that of another pose.

@@ -47,9 +47,7 @@ pub(super) fn strip(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: R
                 text += &format!("   (error {angle}, {position})");
             }
             let found = results::pose(cx.state, source).shown();
-            if let Some(answers) = found.and_then(|found| found.report.answers_text(pose)) {
-                text += &format!("   {answers}");
-            }
+            text.extend(found.and_then(|found| Some(format!("   {}", found.report.answers_text(pose)?))));
             ui.label(RichText::new(text).size(SMALL).color(cx.p.strong));
             let (text, color) = cost_text(cx, hand.as_ref());
             ui.label(RichText::new(text).size(SMALL).color(color)).on_hover_text(

@@ -119,9 +119,7 @@ fn said(cx: &Cx<'_>, source: ImprintSource, wide: bool) -> (String, Color32, Vec
                 }
                 details.extend(pose.truth_rad.map(|truth| format!("true angle {}", units::text_deg(truth))));
             }
-            if let Some(answers) = pose.report.answers_text(pose.grasp_from_object) {
-                text += &format!(" · {answers}");
-            }
+            text.extend(pose.report.answers_text(pose.grasp_from_object).map(|answers| format!(" · {answers}")));
             if let Some(verdict) = &pose.verdict {
                 text += &format!(" · {}", verdict.why);
             }

@@ -445,12 +445,8 @@ impl<'a> Problem<'a> {
         let Some(((winner, (explained, noise_m)), upright)) = told.zip(upright).filter(|_| !stays) else {
             return at_hand.map(|report| AlignReport { ends, ..report });
         };
-        if !alike(&upright, &runs[winner].state) {
-            let iterations = runs[winner].iterations;
-            runs[winner] = Progress::new(upright);
-            self.settle(&mut descents, winner, &mut runs[winner], weight);
-            runs[winner].iterations += iterations;
-        }
+        runs[winner].state = State { phi: crate::units::wrap_angle(upright.phi), ..upright };
+        self.settle(&mut descents, winner, &mut runs[winner], weight);
         let fit = self.fit(noise_m, weight, explained);
         let (starts, points) = (starts.iter().map(|at| at.to_pose(self.centroid)).collect(), descents.points());
         let (lookups, trace) = (descents.lookups, descents.trace);
