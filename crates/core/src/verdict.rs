@@ -88,9 +88,11 @@ const OFF: Limits = [0.5, f64::INFINITY];
 /// Standard deviation of the place where it is known least, meters.
 const PLACE_SD_M: Limits = [PLACE_OPEN_M, f64::INFINITY];
 
-/// Limits of the misfit of a pose beyond the lab's grasps, and the weight in it of the misfit that goes away near by: among all poses
-/// any tool fits somewhere, and the likeness alone does not detect it. From other tools at fresh grasps.
-const ANYWHERE: Limits = [0.55, 0.85];
+/// Limits of the misfit of a pose beyond the lab's grasps, and the weights in it of contact off the tool and of the misfit that goes
+/// away near by: among all poses any tool fits somewhere, and the likeness alone does not detect it. From other tools at fresh grasps;
+/// a mask by depth alone, a third of which lies off the tool, makes no pose wrong.
+const ANYWHERE: Limits = [0.55, 1.25];
+const ANYWHERE_OFF: f64 = 2.0;
 const ANYWHERE_ELSEWHERE: f64 = 4.0;
 /// Chance of the answer below which another one is told.
 const LIKELIEST: f64 = 0.5;
@@ -259,11 +261,11 @@ fn signs(report: &AlignReport, evidence: &Evidence, place_m: f64) -> Vec<Sign> {
         sign(Elsewhere, [angle, gain.min(worst_place)], what);
         let (unlike, off_tool) = (1.0 - membrane.likeness, off.min(OFF_CAP));
         let by_membrane = report.joint.is_some_and(|fit| fit.basis.has_membrane());
-        let (elsewhere, limits) = match Prior::default().allows(report.grasp_from_object) {
-            false if by_membrane => (ANYWHERE_ELSEWHERE * membrane.own.gain, ANYWHERE),
-            _ => (0.0, limits.misfit),
+        let grade = if by_membrane && !Prior::default().allows(report.grasp_from_object) {
+            Grade::of(unlike + ANYWHERE_OFF * off_tool + ANYWHERE_ELSEWHERE * membrane.own.gain, ANYWHERE)
+        } else {
+            Grade::of(unlike + OFF_COUNTS * off_tool, limits.misfit)
         };
-        let grade = Grade::of(unlike + OFF_COUNTS * off_tool + elsewhere, limits);
         let (likeness, off) = (membrane.likeness, percent(off));
         let what = format!("the contact does not match this tool (similarity {likeness:.2}, {off} of it off the tool)");
         sign(Misfit, [grade; 2], what);
