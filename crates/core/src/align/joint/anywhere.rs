@@ -7,7 +7,7 @@
 use std::sync::Arc;
 
 use super::cost::Patch;
-use super::problem::{Descents, LAST, Problem, SCOUTS_WEIGHT, alike};
+use super::problem::{Descents, LAST, Problem, SCOUTS_WEIGHT, WORTH, alike};
 use super::turned::{Frame, REACH, TURNS, Turned};
 use crate::align::batch::State;
 use crate::align::lanes::LANES;
@@ -20,8 +20,6 @@ const CAP_M: f32 = 3e-3;
 const PLACES: usize = 1200;
 /// Poses that go on to each band, coarse to fine.
 const KEEP: [usize; LAST] = [24, 12, 8];
-/// Share by which they may be dearer than the cheapest after each band.
-pub(super) const WORTH: [f64; LAST] = [0.6, 0.4, 0.25];
 
 /// An image's cells with depth: the first that they are compared with, and the height.
 type Cells = Vec<(usize, f32)>;

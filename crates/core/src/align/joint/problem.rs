@@ -6,7 +6,6 @@ use std::sync::Arc;
 
 use glam::DVec2;
 
-use super::anywhere::WORTH;
 use super::cost::{Joint, MaskPart, Noted, Patch, Relief, noise_m};
 use super::image::Image;
 use super::smooth::BANDS;
@@ -67,6 +66,8 @@ const MORE: [[f64; 2]; 2] = [[0.45, -0.45], [0.9, -0.9]];
 /// Steps that move no point by more than about this, meters, end the descents.
 pub(super) const STEPS_M: [f64; 4] = [1e-4, 5e-5, 5e-5, 1e-5];
 
+/// Share by which scouts may be dearer than the cheapest after each band.
+pub(super) const WORTH: [f64; LAST] = [0.6, 0.4, 0.25];
 /// Ends of scouts from all around that are refined.
 const ENDS: usize = 4;
 /// Places of the membranes that they compare in the coarsest band: more than those from the prior, which start nearer.
@@ -435,7 +436,10 @@ impl<'a> Problem<'a> {
         let found = (0..runs.len()).filter(|run| self.config.allows(runs[*run].state.to_pose(self.centroid)));
         let winner = found.min_by(|a, b| runs[*a].cost.total_cmp(&runs[*b].cost)).filter(|run| runs[*run].cost < limit);
         let told = winner.map(|run| (run, descents.told(runs[run].state)));
-        let told = told.filter(|(_, (explained, _))| !self.predicted || *explained >= PREDICTED_EXPLAINED);
+        // Where the mask has no contact either, a membrane must show some.
+        let measured = if at_hand.is_err() { EXPLAINED } else { f64::NEG_INFINITY };
+        let least = if self.predicted { PREDICTED_EXPLAINED } else { measured };
+        let told = told.filter(|(_, (explained, _))| *explained >= least);
         // Of equal answers the one that is turned least; where that is the answer in the prior, it stays as it was.
         let upright = told.map(|(winner, _)| {
             let pose = runs[winner].state.to_pose(self.centroid);
