@@ -152,7 +152,7 @@ impl Target {
     }
 }
 
-/// What a pass does to a part of the picture at its start and end.
+/// Operations of a pass on an attachment, which it clears first or goes on with.
 fn ops<V>(clear: Option<V>, store: wgpu::StoreOp) -> wgpu::Operations<V> {
     wgpu::Operations { load: clear.map_or(wgpu::LoadOp::Load, wgpu::LoadOp::Clear), store }
 }

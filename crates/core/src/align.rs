@@ -471,7 +471,7 @@ impl AlignReport {
     /// Takes, of the poses that the tool's symmetry makes of the answer, the one whose angle is nearest to that of another pose:
     /// a tool that is followed does not turn over.
     pub fn keep_to(&mut self, last: PlanarPose) {
-        let turned = |answer: &PoseAnswer| angle_error(answer.grasp_from_object.theta_rad, last.theta_rad).abs();
+        let turned = |answer: &PoseAnswer| angle_error(answer.grasp_from_object.theta_rad, last.theta_rad);
         let alike = self.answers.iter().enumerate().filter(|(_, answer)| answer.alike);
         let Some((nearest, _)) = alike.min_by(|(_, a), (_, b)| turned(a).total_cmp(&turned(b))) else { return };
         self.answers.swap(0, nearest);

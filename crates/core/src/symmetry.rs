@@ -73,7 +73,7 @@ impl Symmetry {
 
     /// Of these the one whose angle is nearest to that of another pose.
     pub fn nearest(&self, grasp_from_object: PlanarPose, to: PlanarPose) -> PlanarPose {
-        let off = |pose: &PlanarPose| angle_error(pose.theta_rad, to.theta_rad).abs();
+        let off = |pose: &PlanarPose| angle_error(pose.theta_rad, to.theta_rad);
         self.alike(grasp_from_object).min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(grasp_from_object)
     }
 }

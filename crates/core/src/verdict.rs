@@ -102,7 +102,7 @@ const LIKELIEST: f64 = 0.5;
 pub struct Part {
     /// The worst of what was found about it.
     pub grade: Grade,
-    /// Its standard deviation, radians or meters.
+    /// Standard deviation, radians or meters.
     pub sd: f64,
 }
 
@@ -166,7 +166,7 @@ pub struct Sign {
     pub kind: SignKind,
     /// Weight of it: the greater one of those for the angle and the place.
     pub grade: Grade,
-    /// Its weights for the angle and for the place.
+    /// Weights for the angle and for the place.
     #[serde(skip)]
     pub parts: [Grade; 2],
     /// In a few words.

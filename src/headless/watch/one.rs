@@ -243,7 +243,8 @@ fn posed(tool: &str, found: &PoseResult) -> Value {
         "tool": tool, "angle_deg": found.angle_rad.to_degrees(), "y_m": place.y_m, "z_m": place.z_m,
         "grasp_from_object": found.grasp_from_object, "angle_sd_deg": found.angle_sd_rad().map(f64::to_degrees),
         "covariance": found.report.evidence.map(|evidence| evidence.uncertainty.covariance),
-        "verdict": found.verdict, "answers": found.report.answers.iter().map(AnswerRow::new).collect::<Vec<_>>(), "rms_m": found.rms_m, "points": found.num_points, "stop": found.stop,
+        "verdict": found.verdict, "answers": found.report.answers.iter().map(AnswerRow::new).collect::<Vec<_>>(),
+        "rms_m": found.rms_m, "points": found.num_points, "stop": found.stop,
         "truth_deg": found.truth_rad.map(f64::to_degrees), "error_deg": found.error_rad.map(f64::to_degrees),
     })
 }
