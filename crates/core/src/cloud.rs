@@ -109,31 +109,9 @@ pub(super) fn same_size(what: &'static str, size: [usize; 2], imprint: &DepthMap
 }
 
 #[cfg(test)]
-pub(super) mod testing {
-    use super::*;
-    use crate::rig::lab;
-    use crate::sensor::Intrinsics;
-    use glam::{DAffine3, DMat3};
-
-    /// A camera as on the lab's rig: optical axis 35 degrees off the closing axis, 93 mm from the grasp origin.
-    pub(crate) fn camera(width: usize, height: usize) -> DepthCamera {
-        let x = DVec3::new(0.5729, 0.0, -0.8196).normalize();
-        let z = DVec3::new(0.8196, 0.0, 0.5729).normalize();
-        DepthCamera {
-            depth_reference: DepthMap::filled(width, height, 0.09),
-            intrinsics: Intrinsics { fx: 212.0, fy: 211.0, cx: 112.3, cy: 86.1 },
-            crop: lab::BUBBLE.crop,
-            grasp_from_camera: DAffine3::from_mat3_translation(
-                DMat3::from_cols(x, DVec3::Y, z),
-                DVec3::new(-0.0764, 0.0, -0.0541),
-            ),
-        }
-    }
-}
-
-#[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fixture::camera;
     use crate::rig::lab;
 
     const WIDTH: usize = lab::BUBBLE.width;
@@ -145,7 +123,7 @@ mod tests {
 
     #[test]
     fn every_pixel_comes_back_to_its_place() {
-        let camera = testing::camera(WIDTH, HEIGHT);
+        let camera = camera(WIDTH, HEIGHT);
         let lifted = lift(&imprint(), &camera, None).unwrap();
         assert_eq!(lifted.points.len(), WIDTH * HEIGHT);
         for (point, pixel) in lifted.points.iter().zip(&lifted.pixels) {
@@ -156,7 +134,7 @@ mod tests {
 
     #[test]
     fn unusable_depth_is_dropped_and_counted() {
-        let mut camera = testing::camera(4, 2);
+        let mut camera = camera(4, 2);
         let mut imprint = DepthMap::filled(4, 2, 0.001);
         imprint[(0, 0)] = f32::NAN;
         imprint[(1, 0)] = f32::NEG_INFINITY;
@@ -173,7 +151,7 @@ mod tests {
 
     #[test]
     fn cameras_that_do_not_fit_are_refused() {
-        let camera = testing::camera(4, 2);
+        let camera = camera(4, 2);
         let refused =
             |imprint: &DepthMap, camera: &DepthCamera, mask| lift(imprint, camera, mask).unwrap_err().to_string();
         assert!(refused(&imprint(), &camera, None).starts_with("the reference depth is 4 x 2 pixels"));

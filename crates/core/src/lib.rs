@@ -19,6 +19,8 @@ pub mod evaluation;
 pub mod field;
 pub mod findings;
 pub mod fit;
+#[cfg(test)]
+mod fixture;
 pub mod frames;
 pub mod grid;
 pub mod inspect;

@@ -13,7 +13,7 @@ use crate::params::{Leaves, Params};
 use crate::random::{Purpose, Random, dealt};
 use crate::state::{Origin, OriginBuilder};
 use crate::tape::Tensor;
-use crate::trainer::{Descent, Objective, PARTS, StepReport, Trainer};
+use crate::trainer::{Objective, PARTS, Trainer, descend};
 
 /// A mask network as its bundle describes it: where tuning begins.
 #[derive(Clone, Debug)]
@@ -151,7 +151,7 @@ impl Objective for Recipe {
     }
 }
 
-/// A mask network on its way from its bundle to what people drew. To cancel, stop calling [`Descent::step`]: what
+/// A mask network on its way from its bundle to what people drew. To cancel, stop calling [`crate::Descent::step`]: what
 /// [`MaskTuner::tuned`] returns is always usable.
 #[derive(Debug)]
 pub struct MaskTuner {
@@ -161,7 +161,7 @@ pub struct MaskTuner {
 }
 
 impl MaskTuner {
-    /// Before the first step, or where the run stood that [`Descent::to_bytes`] kept as `state`: to the last bit as if it had
+    /// Before the first step, or where the run stood that [`crate::Descent::to_bytes`] kept as `state`: to the last bit as if it had
     /// not been stopped.
     ///
     /// # Errors
@@ -231,24 +231,8 @@ impl MaskTuner {
     }
 }
 
-/// The state of a run is about 3 MB for the shipped bundle.
-impl Descent for MaskTuner {
-    fn step(&mut self) -> Result<StepReport> {
-        self.trainer.step()
-    }
-
-    fn steps_done(&self) -> usize {
-        self.trainer.step
-    }
-
-    fn steps(&self) -> usize {
-        self.trainer.steps
-    }
-
-    fn to_bytes(&self) -> Vec<u8> {
-        self.trainer.to_bytes(self.origin)
-    }
-}
+// The state of a run is about 3 MB for the shipped bundle.
+descend!(MaskTuner);
 
 /// Refuses touches that cannot be learned from, and sets without any.
 fn check(touches: &[MaskTouch], [width, height]: [usize; 2]) -> Result<()> {

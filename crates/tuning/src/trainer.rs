@@ -50,6 +50,30 @@ pub trait Descent {
     fn to_bytes(&self) -> Vec<u8>;
 }
 
+/// [`Descent`] of types with a `trainer` and the `origin` of its state.
+macro_rules! descend {
+    ($($of:ty),+) => {$(
+        impl $crate::Descent for $of {
+            fn step(&mut self) -> $crate::Result<$crate::trainer::StepReport> {
+                self.trainer.step()
+            }
+
+            fn steps_done(&self) -> usize {
+                self.trainer.step
+            }
+
+            fn steps(&self) -> usize {
+                self.trainer.steps
+            }
+
+            fn to_bytes(&self) -> Vec<u8> {
+                self.trainer.to_bytes(self.origin)
+            }
+        }
+    )+};
+}
+pub(crate) use descend;
+
 /// Report of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepReport {

@@ -9,7 +9,7 @@ use crate::params::{Leaves, Params};
 use crate::random::Random;
 use crate::recipe::{FIELD, LINE, Model, Recipe, SHIFT};
 use crate::state::{Origin, OriginBuilder};
-use crate::trainer::{Descent, StepReport, Trainer};
+use crate::trainer::{Trainer, descend};
 
 /// A generator as its bundle describes it, and where tuning begins.
 #[derive(Clone, Debug)]
@@ -85,7 +85,7 @@ pub struct Tuned {
 /// A picture to predict from, in the scale of [`Pair::picture`], and its pad; `None` for a simulated one.
 pub type Query<'a> = (&'a [f32], Option<usize>);
 
-/// A generator on its way from its bundle to a sensor. To cancel, stop calling [`Descent::step`]: what
+/// A generator on its way from its bundle to a sensor. To cancel, stop calling [`crate::Descent::step`]: what
 /// [`Tuner::tuned`] returns is always usable.
 #[derive(Debug)]
 pub struct Tuner {
@@ -96,7 +96,7 @@ pub struct Tuner {
 }
 
 impl Tuner {
-    /// Before the first step, or where the run stood that [`Descent::to_bytes`] kept as `state`: to the last bit as if it had
+    /// Before the first step, or where the run stood that [`crate::Descent::to_bytes`] kept as `state`: to the last bit as if it had
     /// not been stopped.
     ///
     /// # Errors
@@ -146,24 +146,8 @@ impl Tuner {
     }
 }
 
-/// The state of a run is about 100 MB for the shipped bundle.
-impl Descent for Tuner {
-    fn step(&mut self) -> Result<StepReport> {
-        self.trainer.step()
-    }
-
-    fn steps_done(&self) -> usize {
-        self.trainer.step
-    }
-
-    fn steps(&self) -> usize {
-        self.trainer.steps
-    }
-
-    fn to_bytes(&self) -> Vec<u8> {
-        self.trainer.to_bytes(self.origin)
-    }
-}
+// The state of a run is about 100 MB for the shipped bundle.
+descend!(Tuner);
 
 /// A start, read and checked.
 struct Opened {

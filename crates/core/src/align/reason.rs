@@ -79,8 +79,9 @@ pub fn counts<'a>(grids: impl IntoIterator<Item = &'a Grid<Reason>>) -> ReasonCo
 mod tests {
     use super::*;
     use crate::align::{AlignConfig, align, testing};
-    use crate::cloud::{lift, testing::camera};
+    use crate::cloud::lift;
     use crate::field::DistanceField;
+    use crate::fixture::camera;
     use crate::frames::PlanarPose;
     use crate::grid::DepthMap;
     use glam::DVec2;

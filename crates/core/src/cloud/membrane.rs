@@ -174,8 +174,8 @@ fn is_whole(depth: &Grid<f64>, [x, y]: [usize; 2]) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::super::testing;
     use super::*;
+    use crate::fixture;
     use glam::DVec3;
 
     const SIZE: [usize; 2] = [120, 90];
@@ -190,12 +190,12 @@ mod tests {
     }
 
     fn of(imprint: &DepthMap) -> TriMesh {
-        membrane(imprint, &testing::camera(SIZE[0], SIZE[1])).unwrap()
+        membrane(imprint, &fixture::camera(SIZE[0], SIZE[1])).unwrap()
     }
 
     /// The pixel of each corner.
     fn pixels(mesh: &TriMesh) -> Vec<[f64; 2]> {
-        let camera = testing::camera(SIZE[0], SIZE[1]);
+        let camera = fixture::camera(SIZE[0], SIZE[1]);
         let pixel = |p: &DVec3| {
             let (u, v) = camera.project(camera.grasp_from_camera.inverse().transform_point3(*p)).unwrap();
             [u, v]
@@ -219,7 +219,7 @@ mod tests {
         assert_eq!(clean.triangles.len(), noisy.triangles.len());
         // From one pixel to the next, noise turns a normal by up to a right angle.
         assert!(roughest(&noisy) < 0.35, "{}", roughest(&noisy));
-        let camera = testing::camera(SIZE[0], SIZE[1]);
+        let camera = fixture::camera(SIZE[0], SIZE[1]);
         let exact = super::super::lift(&dome(0.0), &camera, None).unwrap();
         let off = noisy.vertices.iter().zip(pixels(&noisy)).map(|(p, [x, y])| {
             let index = y.round() as usize * SIZE[0] + x.round() as usize;
@@ -264,7 +264,7 @@ mod tests {
     #[test]
     fn nothing_is_made_of_nothing() {
         assert!(of(&DepthMap::filled(SIZE[0], SIZE[1], f32::NAN)).triangles.is_empty());
-        let camera = testing::camera(1, 1);
+        let camera = fixture::camera(1, 1);
         assert!(membrane(&DepthMap::filled(1, 1, 0.0), &camera).unwrap().triangles.is_empty());
         assert!(membrane(&dome(0.0), &camera).is_err());
     }

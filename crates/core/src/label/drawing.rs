@@ -260,8 +260,8 @@ mod tests {
     use super::super::marks::Marks;
     use super::super::provenance::Provenance;
     use super::super::sight::Layers;
-    use super::super::sight::testing::{from_above, sheet};
     use super::*;
+    use crate::fixture::{from_above, sheet};
 
     fn imprint() -> DepthMap {
         // Two plateaus joined by a ramp, and a far one of the first's depth.

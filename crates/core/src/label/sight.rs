@@ -195,34 +195,9 @@ fn spacing(points: &[DVec3], pixels: &[[u16; 2]]) -> Option<f64> {
 }
 
 #[cfg(test)]
-pub(super) mod testing {
-    use super::*;
-
-    /// Looks from 0.2 m above along -z at the origin, `scale` pixels per meter there; a picture of 400 x 300 pixels.
-    pub(crate) fn from_above(scale: f64, layers: Layers) -> Sight {
-        let (eye, half) = (0.2, [200.0, 150.0]);
-        let focal = half.map(|half| scale * eye / half);
-        let clip = DMat4::from_cols(
-            DVec4::new(focal[0], 0.0, 0.0, 0.0),
-            DVec4::new(0.0, focal[1], 0.0, 0.0),
-            DVec4::new(0.0, 0.0, 0.0, -1.0),
-            DVec4::new(0.0, 0.0, 0.01, eye),
-        );
-        Sight { clip_from_grasp: clip.as_mat4(), size_px: [400, 300], layers }
-    }
-
-    /// A sheet of 21 x 21 points half a millimeter apart around the axis, at a height.
-    pub(crate) fn sheet(z: f64) -> (Vec<DVec3>, Vec<[u16; 2]>) {
-        let coordinate = |i: u16| (f64::from(i) - 10.0) * 0.0005;
-        let pixels: Vec<[u16; 2]> = (0..21).flat_map(|y| (0..21).map(move |x| [x, y])).collect();
-        (pixels.iter().map(|[x, y]| DVec3::new(coordinate(*x), coordinate(*y), z)).collect(), pixels)
-    }
-}
-
-#[cfg(test)]
 mod tests {
-    use super::testing::{from_above, sheet};
     use super::*;
+    use crate::fixture::{from_above, sheet};
 
     const CENTER: DVec2 = DVec2::new(199.5, 149.5);
 

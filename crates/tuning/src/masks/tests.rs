@@ -1,6 +1,7 @@
 //! Training on a tiny network: the loss falls, a stop costs nothing, what does not count changes nothing.
 
 use super::*;
+use crate::Descent as _;
 use crate::fixture;
 use crate::nets::mask::layout;
 

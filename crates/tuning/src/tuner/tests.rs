@@ -1,4 +1,5 @@
 use super::*;
+use crate::Descent as _;
 use crate::augment::Augment;
 use crate::fixture;
 use crate::image;
