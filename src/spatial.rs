@@ -18,18 +18,22 @@ mod focus;
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::still::space::{InSpace, SpacePicture, SpaceView};
 
-/// The renderer of stills, on the best graphics device that there is; a software one will do.
+/// Draws a pair from a view, turned by an angle in degrees, on the best graphics device that there is; a software one will do.
 ///
 /// # Errors
 /// If there is no device, or the program was built without a renderer.
-pub fn stills() -> Result<impl Fn(&InSpace, &SpaceView) -> Result<SpacePicture, TaskError>, TaskError> {
+#[cfg_attr(not(feature = "gui"), expect(unused_variables))]
+pub fn still(
+    pair: &InSpace,
+    view: &SpaceView,
+) -> Result<impl FnMut(f64) -> Result<SpacePicture, TaskError> + Send + use<>, TaskError> {
     #[cfg(feature = "gui")]
     {
-        let stills = still::Stills::new()?;
-        Ok(move |pair: &InSpace, view: &SpaceView| stills.draw(pair, view))
+        let mut still = still::Still::new(pair, view)?;
+        Ok(move |turned_deg| still.turned(turned_deg))
     }
     #[cfg(not(feature = "gui"))]
-    Err::<fn(&InSpace, &SpaceView) -> Result<SpacePicture, TaskError>, _>(
+    Err::<fn(f64) -> Result<SpacePicture, TaskError>, _>(
         TaskError::new("3D picture", "this program was built without the 3D renderer")
             .with_hint("Build it with the feature gui."),
     )

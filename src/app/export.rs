@@ -123,8 +123,7 @@ fn write(state: &mut State, output: Output, file: PathBuf, effects: &mut Vec<Eff
             let file = if png { file.with_extension("png") } else { file };
             let job = (Worker::Models, "Still", "Draw the still");
             tasks::write(state, job, file, effects, move |file, access, cx| {
-                let drawer = spatial::stills()?;
-                let done = still(&source.dataset, &setup, &access.services.models, drawer, &file, cx)?;
+                let done = still(&source.dataset, &setup, &access.services.models, spatial::still, &file, cx)?;
                 let ([width, height], count) = (done.size_px, done.files.len());
                 let frames = if count == 1 { String::new() } else { format!("{count} frames of ") };
                 Ok((format!("Saved {} ({frames}{width} x {height} pixels)", file.display()), file))

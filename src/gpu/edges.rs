@@ -1,9 +1,8 @@
 //! The edges of a mesh that a pencil would draw: creases, borders, and where the surface turns away from the eye.
 
-use std::collections::HashMap;
-
 use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, DMat4, DVec3, DVec4};
+use rustc_hash::FxHashMap;
 
 use super::buffer::{Elements, Item};
 use super::pipelines::Pipelines;
@@ -144,24 +143,27 @@ fn may_be_seen(edge: &EdgeVertex, eye: [f32; 4], creases: bool) -> bool {
 /// Every edge once, with the normals of its faces. Faces with a corner that is not finite are left out.
 fn edges(mesh: &TriMesh) -> Vec<EdgeVertex> {
     let corner = |i: &u32| mesh.vertices.get(*i as usize).copied().filter(|p| p.is_finite());
-    let mut index_of: HashMap<[[u64; 3]; 2], usize> = HashMap::new();
-    let mut list: Vec<([DVec3; 2], Vec<DVec3>)> = Vec::new();
+    let mut index_of: FxHashMap<[[u64; 3]; 2], usize> = FxHashMap::default();
+    // Each with the normals of its first two faces and the number of all.
+    let mut list: Vec<([DVec3; 2], [DVec3; 2], usize)> = Vec::new();
     for t in &mesh.triangles {
         let [Some(a), Some(b), Some(c)] = t.map(|i| corner(&i)) else { continue };
         let Some(normal) = (b - a).cross(c - a).try_normalize() else { continue };
         for (p, q) in [(a, b), (b, c), (c, a)] {
             let (p, q) = if place(p) <= place(q) { (p, q) } else { (q, p) };
             let index = *index_of.entry([place(p), place(q)]).or_insert_with(|| {
-                list.push(([p, q], Vec::new()));
+                list.push(([p, q], [normal, -normal], 0));
                 list.len() - 1
             });
-            list[index].1.push(normal);
+            let (_, normals, faces) = &mut list[index];
+            *faces += 1;
+            if *faces == 2 {
+                normals[1] = normal;
+            }
         }
     }
-    let vertex = |([a, b], normals): ([DVec3; 2], Vec<DVec3>)| {
-        let first = normals[0];
-        let second = normals.get(1).copied().unwrap_or(-first);
-        let kind = match normals.len() {
+    let vertex = |([a, b], [first, second], faces): ([DVec3; 2], [DVec3; 2], usize)| {
+        let kind = match faces {
             2 if first.dot(second) > CREASE_RAD.cos() => SMOOTH,
             2 => CREASE,
             _ => BORDER,

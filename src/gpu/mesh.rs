@@ -1,10 +1,10 @@
 //! Triangle meshes: the CAD model over the clouds.
 
-use std::collections::HashMap;
 use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, DVec3, DVec4};
+use rustc_hash::FxHashMap;
 
 use super::buffer::{Elements, Item};
 use super::edges::{EdgeData, EdgeStyle};
@@ -175,7 +175,7 @@ impl MeshData {
 /// The distinct ones of some vertices, and the place of each among them: a smooth surface has a sixth as many as corners, and
 /// each is moved to the screen once.
 fn shared(corners: &[MeshVertex]) -> (Vec<MeshVertex>, Vec<u32>) {
-    let (mut distinct, mut place_of) = (Vec::new(), HashMap::new());
+    let (mut distinct, mut place_of) = (Vec::new(), FxHashMap::default());
     let place = |vertex: &MeshVertex| {
         *place_of.entry(bytemuck::cast::<_, [u32; 8]>(*vertex)).or_insert_with(|| {
             distinct.push(*vertex);
@@ -200,7 +200,8 @@ fn vertices(mesh: &TriMesh, shading: Shading, values: &[f32]) -> Vec<MeshVertex>
         .unzip();
     // Twice the area long: large triangles have more say in a shared normal.
     let areas: Vec<DVec3> = faces.iter().map(|[a, b, c]| (*b - *a).cross(*c - *a)).collect();
-    let mut around: HashMap<[u64; 3], Vec<usize>> = HashMap::new();
+    let normals: Vec<DVec3> = areas.iter().map(|area| area.normalize_or_zero()).collect();
+    let mut around: FxHashMap<[u64; 3], Vec<usize>> = FxHashMap::default();
     let crease = match shading {
         Shading::Smooth => CREASE_RAD.cos(),
         Shading::Round => -2.0,
@@ -211,12 +212,10 @@ fn vertices(mesh: &TriMesh, shading: Shading, values: &[f32]) -> Vec<MeshVertex>
         }
     }
     let mut out = Vec::with_capacity(faces.len() * 3);
-    for ((face, area), values) in faces.iter().zip(&areas).zip(values) {
-        let own = area.normalize_or_zero();
+    for ((face, &own), values) in faces.iter().zip(&normals).zip(values) {
         for (p, value) in face.iter().zip(values) {
             let neighbors = around.get(&place(*p)).map_or(&[][..], Vec::as_slice);
-            let rounded: DVec3 =
-                neighbors.iter().map(|&f| areas[f]).filter(|n| n.normalize_or_zero().dot(own) > crease).sum();
+            let rounded: DVec3 = neighbors.iter().filter(|&&f| normals[f].dot(own) > crease).map(|&f| areas[f]).sum();
             let normal = rounded.try_normalize().unwrap_or(own);
             out.push(MeshVertex { position: view::position(*p), normal: normal.as_vec3().to_array(), value });
         }

@@ -93,9 +93,9 @@ pub(super) fn run(args: &StillArgs) -> VerbResult {
         distance_m: args.distance.map(|mm| mm * 1e-3),
     };
     setup.check()?;
-    let drawer = spatial::stills()?;
     let models = args.recipe.model.models();
-    let report = Report { pair: &name, still: still(&dataset, &setup, &models, drawer, &args.out, &output.job())? };
+    let done = still(&dataset, &setup, &models, spatial::still, &args.out, &output.job())?;
+    let report = Report { pair: &name, still: done };
     output.finish(&report, || {
         let [width, height] = report.still.size_px;
         let count = report.still.files.len();

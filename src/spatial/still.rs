@@ -18,6 +18,7 @@ use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::labels::ImprintSource;
 use touch2touch_pipeline::still::space::{Ground, InSpace, SpacePicture, SpaceSide, SpaceView};
 
+const WHAT: &str = "3D picture";
 /// The smaller side of a 3D pane on a screen, pixels: lines, dashes and points of a still are as wide in relation to it.
 const SCREEN_PX: f32 = 460.0;
 /// Samples of a still along each side of a pixel, on top of the device's own.
@@ -160,77 +161,92 @@ fn models(pair: &InSpace, colors: &StillColors, distance_m: Option<f64>, scene: 
     }
 }
 
-/// The renderer of stills: a device of its own.
-pub struct Stills {
+/// A pair on a device of its own, which takes its geometry once.
+pub struct Still {
     gpu: Gpu,
-    pipelines: Arc<Pipelines>,
+    renderer: SceneRenderer,
+    target: Target,
+    scene: SceneData,
+    camera: Camera,
+    size: [u32; 2],
 }
 
-impl Stills {
-    /// Takes the best device that there is, without a window.
+impl Still {
+    /// Frames a pair.
+    ///
+    /// # Errors
+    /// If there is no device, or it cannot draw.
+    pub fn new(pair: &InSpace, view: &SpaceView) -> Result<Self, TaskError> {
+        let scene = scene(pair, view.ground, view.distance_m);
+        let (yaw_rad, pitch_rad) = (view.angles.yaw_deg.to_radians(), view.angles.pitch_deg.to_radians());
+        let mut camera = Camera { yaw_rad, pitch_rad, ..Camera::default() };
+        camera.frame(&focus(&scene), FILLED);
+        Self::of_scene(scene, camera, view.size_px).map_err(failed)
+    }
+
+    /// On the best device that there is, without a window.
     ///
     /// # Errors
     /// If there is none, or it cannot draw.
-    pub fn new() -> Result<Self, TaskError> {
-        Self::try_new().map_err(|err| TaskError::new("3D picture", err.to_string()))
-    }
-
-    fn try_new() -> Result<Self, GpuError> {
+    pub fn of_scene(mut scene: SceneData, camera: Camera, size: [u32; 2]) -> Result<Self, GpuError> {
+        scene.unit_px = fine(size) as f32 * size[0].min(size[1]) as f32 / SCREEN_PX;
         let gpu = Gpu::headless()?.smooth();
-        let pipelines = Arc::new(Pipelines::new(&gpu)?);
-        Ok(Self { gpu, pipelines })
+        let renderer = SceneRenderer::new(&gpu, Arc::new(Pipelines::new(&gpu)?))?;
+        let target = Target::new(&gpu, [1, 1])?;
+        Ok(Self { gpu, renderer, target, scene, camera, size })
     }
 
-    /// Draws a scene of any size: premultiplied, as the device has it.
+    /// Draws it, turned about the vertical after it was framed.
     ///
     /// # Errors
     /// If the device fails.
-    pub fn picture(&self, scene: &SceneData, camera: &Camera, size: [u32; 2]) -> Result<Picture, GpuError> {
-        let fine = if size[0].max(size[1]) <= MOST_FINE_PX { FINE } else { 1 };
-        let unit_px = fine as f32 * size[0].min(size[1]) as f32 / SCREEN_PX;
-        let scene = SceneData { unit_px, moving: false, ..scene.clone() };
+    pub fn turned(&mut self, turned_deg: f64) -> Result<SpacePicture, TaskError> {
+        let camera = Camera { yaw_rad: self.camera.yaw_rad + turned_deg.to_radians(), ..self.camera };
+        let drawn = self.picture(&camera).map_err(failed)?;
+        let [width, height] = drawn.size.map(|n| n as usize);
+        let pixels = Grid::from_vec(width, height, unmultiplied(&drawn.rgba));
+        let pixels = pixels.map_err(|err| TaskError::from_error(WHAT, &err))?;
+        Ok(SpacePicture { pixels, px_per_m: camera.px_per_m(self.size) })
+    }
+
+    /// Draws it from a camera: premultiplied, as the device has it.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub fn picture(&mut self, camera: &Camera) -> Result<Picture, GpuError> {
+        let Self { gpu, renderer, target, scene, size, .. } = self;
+        let fine = fine(*size);
         let whole = size.map(|n| n * fine);
         // What shades a pixel from around it must not end at the border of a part.
         let margin = ((0.1 * f64::from(whole[0].min(whole[1]))).ceil() as u32).next_multiple_of(fine);
-        let texture = MOST_TEXTURE_PX.min(self.gpu.device.limits().max_texture_dimension_2d);
+        let texture = MOST_TEXTURE_PX.min(gpu.device.limits().max_texture_dimension_2d);
         // What fits is one part.
         let inner = match whole[0].max(whole[1]) <= texture {
             true => texture,
             false => (texture.saturating_sub(2 * margin).max(256) / fine) * fine,
         };
-        let mut renderer = SceneRenderer::new(&self.gpu, self.pipelines.clone())?;
-        let mut target = Target::new(&self.gpu, [1, 1])?;
-        let mut out = Picture { size, rgba: vec![0; size[0] as usize * size[1] as usize * 4] };
+        let mut out = Picture { size: *size, rgba: vec![0; size[0] as usize * size[1] as usize * 4] };
         for top in (0..whole[1]).step_by(inner as usize) {
             for left in (0..whole[0]).step_by(inner as usize) {
                 let at = [left, top].map(|n| n.saturating_sub(margin));
                 let end: [u32; 2] = std::array::from_fn(|i| ([left, top][i] + inner + margin).min(whole[i]));
                 let part = Part { of: whole, at, size: [end[0] - at[0], end[1] - at[1]] };
-                target.resize(&self.gpu, part.size)?;
-                renderer.render(&self.gpu, &scene, (camera, part), &target)?;
-                lay(&mut out, &target.read(&self.gpu)?, part, ([left, top], inner), fine);
+                target.resize(gpu, part.size)?;
+                renderer.render(gpu, scene, (camera, part), target)?;
+                lay(&mut out, &target.read(gpu)?, part, ([left, top], inner), fine);
             }
         }
         Ok(out)
     }
+}
 
-    /// Draws a pair.
-    ///
-    /// # Errors
-    /// If the device fails.
-    pub fn draw(&self, pair: &InSpace, view: &SpaceView) -> Result<SpacePicture, TaskError> {
-        let scene = scene(pair, view.ground, view.distance_m);
-        let (yaw, pitch) = (view.angles.yaw_deg.to_radians(), view.angles.pitch_deg.to_radians());
-        let mut camera = Camera { yaw_rad: yaw, pitch_rad: pitch, ..Camera::default() };
-        camera.frame(&focus(&scene), FILLED);
-        camera.yaw_rad += view.turned_deg.to_radians();
-        let drawn = self.picture(&scene, &camera, view.size_px);
-        let drawn = drawn.map_err(|err| TaskError::new("3D picture", err.to_string()))?;
-        let [width, height] = drawn.size.map(|n| n as usize);
-        let pixels = Grid::from_vec(width, height, unmultiplied(&drawn.rgba));
-        let pixels = pixels.map_err(|err| TaskError::from_error("3D picture", &err))?;
-        Ok(SpacePicture { pixels, px_per_m: camera.px_per_m(view.size_px) })
-    }
+fn failed(err: GpuError) -> TaskError {
+    TaskError::new(WHAT, err.to_string())
+}
+
+/// Samples along each side of a pixel of a still of this size.
+fn fine(size: [u32; 2]) -> u32 {
+    if size[0].max(size[1]) <= MOST_FINE_PX { FINE } else { 1 }
 }
 
 /// Takes the inner pixels of a part over, each the mean of `fine` x `fine`.

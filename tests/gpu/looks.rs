@@ -2,7 +2,7 @@
 
 use super::*;
 use touch2touch::gpu::floor::Floor;
-use touch2touch::spatial::still::Stills;
+use touch2touch::spatial::still::Still;
 
 /// A floor 20 mm below the origin.
 fn floor(opacity: f32, shadow: f32) -> Option<Floor> {
@@ -36,8 +36,8 @@ fn a_still_has_smooth_edges_and_parts_that_fit() {
         *vertex = turn.transform_point3(*vertex);
     }
     let data = SceneData { meshes: vec![mesh_item(mesh, style)], background: [0.0; 3], ..scene() };
-    let stills = Stills::new().unwrap();
-    let picture = stills.picture(&data, &camera, [160, 160]).unwrap();
+    let mut still = Still::of_scene(data.clone(), camera, [160, 160]).unwrap();
+    let picture = still.picture(&camera).unwrap();
     let reds: std::collections::BTreeSet<u8> = picture.rgba.chunks_exact(4).map(|p| p[0]).collect();
     assert!(reds.len() > 8, "between black and white lie the steps of an edge: {reds:?}");
     // The same picture in quarters.

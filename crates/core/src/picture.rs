@@ -1,6 +1,8 @@
 //! Pictures as people see them: depth through a color map, color pictures and differences as bytes. Panes and
 //! files take these, so that the same pixel has the same color everywhere.
 
+use rayon::prelude::*;
+
 use super::colormap::{ColorMap, Range};
 use super::grid::{DepthMap, Grid, RgbGrid};
 
@@ -37,17 +39,17 @@ pub fn mean_of_squares(rgba: &[u8], width: usize, side: usize) -> Vec<u8> {
         return rgba.to_vec();
     }
     let (row, count) = (width * 4, (side * side) as u32);
-    let mut out = Vec::with_capacity(rgba.len() / (side * side));
-    for rows in rgba.chunks_exact(row * side) {
-        for left in (0..row).step_by(4 * side) {
+    let row_of_means = |rows: &[u8]| {
+        let squares = (0..row).step_by(4 * side).flat_map(|left| {
             let mut sum = [count / 2; 4];
             for pixel in (0..side).flat_map(|j| rows[j * row + left..][..4 * side].chunks_exact(4)) {
                 sum.iter_mut().zip(pixel).for_each(|(sum, byte)| *sum += u32::from(*byte));
             }
-            out.extend(sum.map(|sum| (sum / count) as u8));
-        }
-    }
-    out
+            sum.map(|sum| (sum / count) as u8)
+        });
+        squares.collect::<Vec<u8>>()
+    };
+    rgba.par_chunks_exact(row * side).flat_map_iter(row_of_means).collect()
 }
 
 /// Pixels with their own colors, of bytes with colors that are multiplied by the opacity.

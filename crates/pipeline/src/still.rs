@@ -91,16 +91,17 @@ impl StillSetup {
     }
 }
 
-/// Draws a pair and writes it: a PNG file, or `frame_0001.png` and so on into a folder.
+/// Draws a pair and writes it: a PNG file, or `frame_0001.png` and so on into a folder. `draw` frames it, and what that returns
+/// draws it turned about the vertical by an angle in degrees.
 ///
 /// # Errors
 /// If it cannot be drawn as asked, the pair cannot be read, its results cannot be made, the graphics device fails, or the
 /// job was told to stop.
-pub fn still(
+pub fn still<F: FnMut(f64) -> Result<SpacePicture, TaskError> + Send>(
     dataset: &Dataset,
     setup: &StillSetup,
     models: &Models,
-    draw: impl Fn(&InSpace, &SpaceView) -> Result<SpacePicture, TaskError>,
+    draw: impl FnOnce(&InSpace, &SpaceView) -> Result<F, TaskError>,
     out: &Path,
     cx: &JobCx,
 ) -> Result<StillFiles, TaskError> {
@@ -117,22 +118,22 @@ pub fn still(
             .map_err(|err| TaskError::new(WHAT, format!("cannot make the folder: {err} ({})", out.display())))?;
     }
     let size_px = [setup.width_px; 2];
+    let StillSetup { pane, ground, angles, distance_m, .. } = *setup;
+    let mut turned = draw(&pair, &SpaceView { pane, ground, angles, distance_m, size_px })?;
     let mut done = StillFiles { files: Vec::new(), size_px, px_per_mm: 0.0, note: pair.note.clone() };
-    for frame in 0..frames {
+    let mut last: Option<SpacePicture> = None;
+    for frame in 0..=frames {
         cx.check(WHAT)?;
         cx.progress(u64::from(frame), u64::from(frames), name.clone());
-        let turned_deg = 360.0 * f64::from(frame) / f64::from(frames);
-        let StillSetup { pane, ground, angles, distance_m, .. } = *setup;
-        let view = SpaceView { pane, ground, angles, turned_deg, distance_m, size_px };
-        let picture = draw(&pair, &view)?;
-        done.px_per_mm = picture.px_per_m * 1e-3;
-        let file = match setup.turntable {
-            Some(_) => out.join(format!("frame_{:04}.png", frame + 1)),
-            None => out.to_owned(),
-        };
-        images::write_rgba8(&file, &picture.pixels)
-            .map_err(|err| TaskError::new(WHAT, format!("{err} ({})", file.display())))?;
-        done.files.push(file);
+        let file = setup.turntable.map_or_else(|| out.to_owned(), |_| out.join(format!("frame_{frame:04}.png")));
+        // A frame is written while the next one is drawn.
+        let write = || last.as_ref().map(|picture| images::write_rgba8(&file, &picture.pixels)).transpose();
+        let next = || (frame < frames).then(|| turned(360.0 * f64::from(frame) / f64::from(frames))).transpose();
+        let (written, drawn) = rayon::join(write, next);
+        written.map_err(|err| TaskError::new(WHAT, format!("{err} ({})", file.display())))?;
+        done.files.extend(last.take().map(|_| file));
+        last = drawn?;
+        done.px_per_mm = last.as_ref().map_or(done.px_per_mm, |picture| picture.px_per_m * 1e-3);
     }
     Ok(done)
 }
@@ -144,12 +145,17 @@ mod tests {
     use touch2touch_core::grid::Grid;
 
     /// Draws the share of the frame's turn as a color, and nothing in the upper half.
-    fn plain(pair: &InSpace, view: &SpaceView) -> Result<SpacePicture, TaskError> {
+    fn plain(
+        pair: &InSpace,
+        view: &SpaceView,
+    ) -> Result<impl FnMut(f64) -> Result<SpacePicture, TaskError> + use<>, TaskError> {
         assert!(pair.sides.iter().all(|side| side.pose.is_some() && !side.contact.is_empty()));
         let [w, h] = view.size_px.map(|n| n as usize);
-        let color = (view.turned_deg / 360.0 * 255.0) as u8;
-        let pixels = Grid::from_fn(w, h, |_, y| if y < h / 2 { [0; 4] } else { [color, 200, 200, 255] });
-        Ok(SpacePicture { pixels, px_per_m: 10_000.0 })
+        Ok(move |turned_deg: f64| {
+            let color = (turned_deg / 360.0 * 255.0) as u8;
+            let pixels = Grid::from_fn(w, h, |_, y| if y < h / 2 { [0; 4] } else { [color, 200, 200, 255] });
+            Ok(SpacePicture { pixels, px_per_m: 10_000.0 })
+        })
     }
 
     fn setup() -> StillSetup {

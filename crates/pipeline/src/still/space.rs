@@ -105,8 +105,6 @@ pub struct SpaceView {
     pub ground: Ground,
     /// Direction of the view.
     pub angles: ViewAngles,
-    /// Turn of the view about the vertical after it was framed, degrees.
-    pub turned_deg: f64,
     /// Distance at which the colors of signed distances end, meters; `None` where the model has its own color.
     pub distance_m: Option<f64>,
     /// Width and height, pixels.
