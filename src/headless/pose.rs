@@ -182,7 +182,7 @@ fn pose_cases(args: &PoseArgs, asked: &PairInput<'_>, models: &Models) -> anyhow
             evidence: answer.and_then(|found| found.report.evidence),
             answers: answer.iter().flat_map(|found| &found.report.answers).map(AnswerRow::new).collect(),
             stop: found.as_ref().map_or_else(|err| err.why.clone(), |found| found.stop.clone()),
-            accepted: accepted.map(|a| Accepted::new(a, truth.map(|truth| truth.inverse().theta_rad))),
+            accepted: accepted.map(|a| Accepted::new(a, truth.zip(model.or(touch.tool.ok())))),
             // The evidence stands beside it.
             report: found.ok().filter(|_| args.trace).map(|found| AlignReport { evidence: None, ..found.report }),
         })

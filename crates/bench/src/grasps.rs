@@ -15,23 +15,23 @@ use serde::Serialize;
 use super::Machine;
 use super::figures::quantile;
 use super::registration::{images, is_straight, points};
-use super::rows::position_error_mm;
 use crate::json::JsonArgs;
 use touch2touch::headless::{Output, VerbResult};
 use touch2touch_bench::known::{Case, Stratum, spoilt};
 use touch2touch_bench::random_tool::random_tool;
-use touch2touch_core::align::{AlignReport, Ask, Contacts, Range};
+use touch2touch_core::align::{Ask, Contacts, Evidence, Range};
 use touch2touch_core::catalog::{self, ToolSpec};
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::pose::{Registration, ToolModel, register, register_with};
 use touch2touch_core::sim::{BubbleConfig, Grasp, SimConfig, random_grasp, random_grasp_within, simulate};
 use touch2touch_core::symmetry::Symmetry;
-use touch2touch_core::units::angle_error;
 use touch2touch_core::verdict::{Grade, Verdict};
 
 /// A pose this far off is right, degrees; and millimeters, for an answer beside the first.
 const RIGHT_DEG: f64 = 5.0;
 const RIGHT_MM: f64 = 5.0;
+/// Answers this near are one, up to the symmetry of the tool, degrees.
+const SAME_DEG: f64 = 0.1;
 /// Farthest place of a grasp at any turn, meters.
 const ANY_PLACE_M: f64 = 0.015;
 /// Drawn tools.
@@ -136,11 +136,12 @@ struct Found {
     error_deg: Option<f64>,
     position_mm: Option<f64>,
     ms: f64,
-    grade: Option<Grade>,
+    verdict: Option<Verdict>,
+    evidence: Option<Evidence>,
     /// The answers with their weights, those that are alike as one.
     answers: Vec<Listed>,
-    /// Grade of the pose of a tool that it is not of; none without a pose.
-    wrong_tool: Option<Grade>,
+    /// Verdict on the pose of a tool that it is not of; none without a pose.
+    wrong_tool: Option<Verdict>,
     explained: f64,
 }
 
@@ -169,12 +170,10 @@ struct Tools {
     straight: Vec<bool>,
 }
 
-/// Errors of a pose, degrees and millimeters: of the nearest pose that the tool's symmetry makes of the truth.
+/// Errors of a pose, degrees and millimeters, up to the tool's symmetry.
 fn errors(pose: PlanarPose, truth: PlanarPose, symmetry: &Symmetry) -> (f64, f64) {
-    let each = symmetry
-        .alike(truth)
-        .map(|truth| (angle_error(pose.theta_rad, truth.theta_rad).to_degrees().abs(), position_error_mm(pose, truth)));
-    each.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f64::NAN, f64::NAN))
+    let off = symmetry.difference(pose, truth);
+    (off.angle_rad.to_degrees(), off.position_m * 1e3)
 }
 
 fn found(held: &Held, range: Range, tools: &Tools) -> Found {
@@ -197,23 +196,24 @@ fn found(held: &Held, range: Range, tools: &Tools) -> Found {
     let symmetry = Symmetry::of(&tools.models[case.tool]);
     let off = report.as_ref().map(|report| errors(report.grasp_from_object, case.grasp_from_object, &symmetry));
     let is_right = |(deg, mm): (f64, f64)| deg <= RIGHT_DEG && (mm <= RIGHT_MM || tools.straight[case.tool]);
-    let mut answers: Vec<Listed> = Vec::new();
+    let mut answers: Vec<(PlanarPose, Listed)> = Vec::new();
     for answer in report.iter().flat_map(|report| &report.answers) {
-        let right = is_right(errors(answer.grasp_from_object, case.grasp_from_object, &symmetry));
+        let pose = answer.grasp_from_object;
+        let right = is_right(errors(pose, case.grasp_from_object, &symmetry));
         // Of one answer the tool's symmetry makes several of equal weight.
-        match answers.first_mut().filter(|_| answer.alike) {
-            Some(first) => first.weight += answer.weight,
-            None => answers.push(Listed { weight: answer.weight, right }),
+        match answers.iter_mut().find(|(known, _)| errors(*known, pose, &symmetry).0 < SAME_DEG) {
+            Some((_, first)) => first.weight += answer.weight,
+            None => answers.push((pose, Listed { weight: answer.weight, right })),
         }
     }
-    let grade = |report: &AlignReport| Verdict::of(report).map(|verdict| verdict.grade);
     Found {
         error_deg: off.map(|(deg, _)| deg),
         position_mm: off.map(|(_, mm)| mm),
         ms,
-        grade: report.as_ref().and_then(grade),
-        answers,
-        wrong_tool: judged(held.other).as_ref().and_then(grade),
+        verdict: report.as_ref().and_then(Verdict::of),
+        evidence: report.as_ref().and_then(|report| report.evidence),
+        answers: answers.into_iter().map(|(_, listed)| listed).collect(),
+        wrong_tool: judged(held.other).as_ref().and_then(Verdict::of),
         explained: report.and_then(|report| report.joint).map_or(0.0, |fit| fit.explained),
     }
 }
@@ -253,7 +253,7 @@ impl Line {
         let any = |_: &Row, _: &Found| true;
         let right = |found: &Found| found.error_deg.is_some_and(|deg| deg <= RIGHT_DEG);
         let degrees = || all.iter().map(|(_, found)| found.error_deg.unwrap_or(180.0));
-        let graded = |grade: Option<Grade>, least: Grade| grade.is_none_or(|grade| grade >= least);
+        let graded = |verdict: &Option<Verdict>, least: Grade| verdict.as_ref().is_none_or(|v| v.grade >= least);
         let (mut bins, mut listed) = ([(0usize, 0.0, 0usize); BINS], 0usize);
         for answer in all.iter().flat_map(|(_, found)| &found.answers) {
             let bin = &mut bins[((answer.weight * BINS as f64) as usize).min(BINS - 1)];
@@ -274,10 +274,10 @@ impl Line {
             second: share(&|row, _| row.turns == 0, &|found| {
                 found.answers.iter().any(|answer| answer.right) && found.answers.iter().any(|answer| !answer.right)
             }),
-            right_doubted: share(&|_, found| right(found), &|found| graded(found.grade, Grade::Check)),
-            right_wrong: share(&|_, found| right(found), &|found| graded(found.grade, Grade::Wrong)),
-            other_told: share(&any, &|found| graded(found.wrong_tool, Grade::Check)),
-            other_wrong: share(&any, &|found| graded(found.wrong_tool, Grade::Wrong)),
+            right_doubted: share(&|_, found| right(found), &|found| graded(&found.verdict, Grade::Check)),
+            right_wrong: share(&|_, found| right(found), &|found| graded(&found.verdict, Grade::Wrong)),
+            other_told: share(&any, &|found| graded(&found.wrong_tool, Grade::Check)),
+            other_wrong: share(&any, &|found| graded(&found.wrong_tool, Grade::Wrong)),
         }
     }
 

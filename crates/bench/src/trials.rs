@@ -40,7 +40,7 @@ use touch2touch_core::rig::Rig;
 use touch2touch_core::sample::Sample;
 use touch2touch_core::sim::{Sensors, random_grasp, simulate};
 use touch2touch_core::units::{angle_error, fixed};
-use touch2touch_core::verdict::Verdict;
+use touch2touch_core::verdict::{Grade, Sign, SignKind, Verdict};
 use touch2touch_pipeline::io::dataset::Dataset;
 use touch2touch_pipeline::job::JobCx;
 use touch2touch_pipeline::labels::{ImprintSource, PairLabels};
@@ -55,6 +55,8 @@ const TRIAL_SEED: u64 = 0x7e1a_1000_0000_0000 + 1_000_003;
 const GIVE_RAD: f64 = 2.0 / 180.0 * std::f64::consts::PI;
 /// Room to each side of the upright tool in its hole, meters.
 const ROOM_M: f64 = 0.001;
+/// Standard deviation across the tool up to which its place is known, meters.
+const PLACE_M: f64 = 2e-3;
 
 /// Arguments of `bench trials`.
 #[derive(Debug, Args)]
@@ -260,8 +262,10 @@ impl Hand<'_> {
                 // Where a tool is along its own axis is no fault: it is let down along it until it meets something.
                 let (pose, evidence) = (found.grasp_from_object, found.report.evidence.as_ref());
                 let across_m = evidence.map(|e| e.uncertainty.along_m(pose, DVec2::from_angle(pose.theta_rad)));
-                let verdict = across_m.and_then(|across_m| Verdict::with_place(&found.report, across_m));
-                let grade = verdict.map(|verdict| verdict.grade);
+                let is_known = across_m.is_some_and(|across_m| across_m <= PLACE_M);
+                let counts = |sign: &&Sign| !(is_known && sign.kind == SignKind::PlaceOpen);
+                let worst = |verdict: &Verdict| verdict.against.iter().filter(counts).map(|sign| sign.grade).max();
+                let grade = found.verdict.as_ref().map(|verdict| worst(verdict).unwrap_or(Grade::Good));
                 let tried = Tried { grade, success: self.goal.succeeds(grasp) };
                 Held { error_rad: found.error_rad.unwrap_or(f64::NAN), tried }
             }

@@ -105,7 +105,7 @@ pub fn without_grain(imprint: &DepthMap, radius_px: usize) -> DepthMap {
 }
 
 /// An imprint that rises less than this holds no contact: a bubble that is touched at all gives way by more.
-const FLAT_M: f32 = 0.000_5;
+pub(crate) const FLAT_M: f32 = 0.000_5;
 /// The same of a gel, which has no air to give way.
 const GEL_FLAT_M: f32 = 0.000_05;
 /// Depth from which on a gel is taken to be in contact, meters, where nobody says another.
@@ -298,7 +298,7 @@ mod tests {
     #[test]
     fn cad_contact_follows_the_pose() {
         // A 6 mm bar along z, 1 mm in front of a flat membrane that is everywhere 90 mm from the camera.
-        let camera = super::super::cloud::testing::camera(175, 140);
+        let camera = crate::fixture::camera(175, 140);
         let imprint = DepthMap::filled(175, 140, 0.0);
         let center = cloud::lift_pixel(&imprint, &camera, 87, 66).unwrap();
         let bar =

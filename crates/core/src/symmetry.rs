@@ -6,6 +6,7 @@ use std::sync::Arc;
 use glam::DVec2;
 
 use super::frames::PlanarPose;
+use super::manual::PoseDifference;
 use super::mesh::sampling::spread;
 use super::tent::{Sheet, heights};
 use super::tool::ToolModel;
@@ -75,6 +76,11 @@ impl Symmetry {
     pub fn nearest(&self, grasp_from_object: PlanarPose, to: PlanarPose) -> PlanarPose {
         let off = |pose: &PlanarPose| angle_error(pose.theta_rad, to.theta_rad);
         self.alike(grasp_from_object).min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(grasp_from_object)
+    }
+
+    /// Difference of a pose from the true one, or from the nearest of those that no touch tells apart from it.
+    pub fn difference(&self, found: PlanarPose, truth: PlanarPose) -> PoseDifference {
+        PoseDifference::between(found, self.nearest(truth, found))
     }
 }
 

@@ -1,5 +1,6 @@
 //! [`Verdict`]: how much a registered pose can be relied on, without the truth, in words. One for every view, table and file.
 
+use glam::DVec2;
 use serde::{Deserialize, Serialize, Serializer};
 use serde_json::json;
 
@@ -65,7 +66,7 @@ const EXPLAINED: Membranes = Membranes {
     fingers: [0.13, 0.2],
     elsewhere: [0.1, 0.3],
     misfit: [0.6, 0.72],
-    angle_rad: [2.0 / 180.0 * std::f64::consts::PI, 8.0 / 180.0 * std::f64::consts::PI],
+    angle_rad: [3.5 / 180.0 * std::f64::consts::PI, 12.0 / 180.0 * std::f64::consts::PI],
 };
 /// Predictions that are no membrane of this tool at this pressure ([`Basis::Unlike`]), most of them of light grasps. The mask gives
 /// the pose and every one is to be checked for it; wrong is only what such predictions of right poses do not show. Where the
@@ -137,6 +138,8 @@ pub struct Verdict {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SignKind {
+    /// One of the fingers measured no contact.
+    Blank,
     /// It lies outside the range that was searched.
     Beyond,
     /// Another pose is likelier.
@@ -176,20 +179,8 @@ pub struct Sign {
 impl Verdict {
     /// The verdict on the answer of a registration; `None` unless its evidence was asked for.
     pub fn of(report: &AlignReport) -> Option<Self> {
-        Self::with_place(report, report.evidence?.uncertainty.place_m(report.grasp_from_object))
-    }
-
-    /// `angle good (±0.3°), place uncertain (±3.20 mm)`.
-    pub fn parts_text(&self) -> String {
-        let word =
-            |part: Part| if part.grade == Grade::Check { "uncertain".to_owned() } else { part.grade.to_string() };
-        let (turn, shift) = (units::text_deg(self.angle.sd), units::text_mm(self.place.sd));
-        format!("angle {} (±{turn}), place {} (±{shift})", word(self.angle), word(self.place))
-    }
-
-    /// The verdict for one to whom only so much of the spread of the place matters, as a standard deviation, meters.
-    pub fn with_place(report: &AlignReport, place_m: f64) -> Option<Self> {
         let evidence = report.evidence.as_ref()?;
+        let place_m = evidence.uncertainty.place_m(report.grasp_from_object);
         let mut against = signs(report, evidence, place_m);
         let worst = |part: usize| against.iter().map(|sign| sign.parts[part]).max().unwrap_or(Grade::Good);
         let angle = Part { grade: worst(0), sd: evidence.uncertainty.angle_rad() };
@@ -198,6 +189,14 @@ impl Verdict {
         against.sort_by_key(|sign| std::cmp::Reverse(sign.grade));
         let why = against.first().map_or_else(|| fits(evidence), |sign| sign.what.clone());
         Some(Self { grade: angle.grade.max(place.grade), angle, place, why, against })
+    }
+
+    /// `angle good (±0.3°), place uncertain (±3.20 mm)`.
+    pub fn parts_text(&self) -> String {
+        let word =
+            |part: Part| if part.grade == Grade::Check { "uncertain".to_owned() } else { part.grade.to_string() };
+        let (turn, shift) = (units::text_deg(self.angle.sd), units::text_mm(self.place.sd));
+        format!("angle {} (±{turn}), place {} (±{shift})", word(self.angle), word(self.place))
     }
 }
 
@@ -211,20 +210,22 @@ fn fits(evidence: &Evidence) -> String {
 }
 
 fn signs(report: &AlignReport, evidence: &Evidence, place_m: f64) -> Vec<Sign> {
-    use SignKind::{AngleOpen, Beyond, Elsewhere, Fingers, MaskAlone, Misfit, OffTool, PlaceOpen, Several, Swapped};
+    use SignKind::{
+        AngleOpen, Beyond, Blank, Elsewhere, Fingers, MaskAlone, Misfit, OffTool, PlaceOpen, Several, Swapped,
+    };
     let mut signs = Vec::new();
     let mut sign = |kind, [angle, place]: [Grade; 2], what| {
         signs.push(Sign { kind, grade: angle.max(place), parts: [angle, place], what });
     };
     // What slides along itself may be found elsewhere, and is no wrong pose for that.
     let worst_place = if place_m > PLACE_SD_M[0] { Grade::Check } else { Grade::Wrong };
+    if evidence.blank {
+        sign(Blank, [Grade::Wrong; 2], "one finger measured no contact".to_owned());
+    }
     if !report.within_prior {
         let [degrees, shift_mm] = report.range.lengths();
-        sign(
-            Beyond,
-            [Grade::Check; 2],
-            format!("the pose lies outside the search range (±{degrees}°, ±{shift_mm} mm)"),
-        );
+        let what = format!("the pose lies outside the search range (±{degrees}°, ±{shift_mm} mm)");
+        sign(Beyond, [Grade::Check; 2], what);
     }
     let own: f64 = report.answers.iter().filter(|answer| answer.alike).map(|answer| answer.weight).sum();
     if let Some(other) = report.answers.iter().find(|answer| !answer.alike).filter(|_| own < LIKELIEST) {
@@ -239,13 +240,11 @@ fn signs(report: &AlignReport, evidence: &Evidence, place_m: f64) -> Vec<Sign> {
         Some(fit) if fit.basis == Basis::Unlike => &UNLIKE,
         _ => &EXPLAINED,
     };
+    let mut matches = false;
     if let Some(membrane) = evidence.membrane {
         if let Some(gain) = membrane.swapped {
-            sign(
-                Swapped,
-                [Grade::of(gain, limits.swapped); 2],
-                "the imprints fit better with the fingers swapped".to_owned(),
-            );
+            let what = "the imprints fit better with the fingers swapped".to_owned();
+            sign(Swapped, [Grade::of(gain, limits.swapped); 2], what);
         }
         let way =
             |to: align::Elsewhere| format!("{} and {}", units::text_deg(to.angle_rad), units::text_mm(to.position_m));
@@ -266,15 +265,26 @@ fn signs(report: &AlignReport, evidence: &Evidence, place_m: f64) -> Vec<Sign> {
         } else {
             Grade::of(unlike + OFF_COUNTS * off_tool, limits.misfit)
         };
+        matches = by_membrane && grade == Grade::Good;
         let (likeness, off) = (membrane.likeness, percent(off));
         let what = format!("the contact does not match this tool (similarity {likeness:.2}, {off} of it off the tool)");
         sign(Misfit, [grade; 2], what);
     }
-    sign(OffTool, [Grade::of(off, OFF); 2], format!("{} of the contact mask lies off the tool", percent(off)));
+    // Where the membranes have the tool's shape it is the mask that is off, not the pose.
+    if !matches {
+        sign(OffTool, [Grade::of(off, OFF); 2], format!("{} of the contact mask lies off the tool", percent(off)));
+    }
     let angle_rad = evidence.uncertainty.angle_rad();
     let what = format!("the contact does not determine the angle (±{})", units::text_deg(angle_rad));
     sign(AngleOpen, [Grade::of(angle_rad, limits.angle_rad), Grade::Good], what);
-    let what = format!("the contact does not determine the position (±{})", units::text_mm(place_m));
+    let [along, across] = evidence.uncertainty.half_axes(report.grasp_from_object).map(DVec2::length);
+    let one_way = along > PLACE_SD_M[0] && across <= PLACE_SD_M[0] && angle_rad <= limits.angle_rad[0];
+    let what = if one_way {
+        "a straight edge leaves the position along it open"
+    } else {
+        "the contact does not determine the position"
+    };
+    let what = format!("{what} (±{})", units::text_mm(place_m));
     sign(PlaceOpen, [Grade::Good, Grade::of(place_m, PLACE_SD_M)], what);
     if let Some(fit) = report.joint.filter(|fit| !fit.basis.has_membrane()) {
         sign(MaskAlone, [Grade::Check; 2], fit.basis.to_string());

@@ -9,7 +9,8 @@ use touch2touch_core::findings::Finding;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::manual::AcceptedPose;
 use touch2touch_core::metrics::AngleSummary;
-use touch2touch_core::units::angle_error;
+use touch2touch_core::pose::ToolModel;
+use touch2touch_core::symmetry::Symmetry;
 use touch2touch_core::verdict::{Grade, Verdict};
 use touch2touch_core::which_tool::Candidate;
 
@@ -107,12 +108,13 @@ pub(super) struct Accepted {
 }
 
 impl Accepted {
-    pub(super) fn new(accepted: AcceptedPose, truth_rad: Option<f64>) -> Self {
+    pub(super) fn new(accepted: AcceptedPose, truth: Option<(PlanarPose, &ToolModel)>) -> Self {
         let found = accepted.pose.inverse();
+        let off = truth.map(|(truth, tool)| Symmetry::of(tool).difference(accepted.pose, truth));
         Self {
             by_hand: accepted.by_hand,
             angle_deg: found.theta_rad.to_degrees(),
-            error_deg: truth_rad.map(|t| angle_error(found.theta_rad, t).to_degrees()),
+            error_deg: off.map(|off| off.angle_rad.to_degrees()),
             y_m: found.y_m,
             z_m: found.z_m,
             grasp_from_object: accepted.pose,

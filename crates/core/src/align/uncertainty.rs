@@ -11,7 +11,7 @@ use crate::frames::PlanarPose;
 
 /// Standard deviation of a place, where it is known least, beyond which the contact leaves it open, meters. The gripper alone knows
 /// it to 2.9 mm.
-pub(crate) const PLACE_OPEN_M: f64 = 2e-3;
+pub(crate) const PLACE_OPEN_M: f64 = 1.75e-3;
 
 /// Spread of the errors of a pose, as a normal distribution about it.
 ///
@@ -63,12 +63,16 @@ impl Uncertainty {
         Self::new(information.sum(), center, pose, 2.0)
     }
 
-    /// The same pose if another estimate says that it lies elsewhere: their difference is a part of the spread.
+    /// The same pose if another estimate says that it lies elsewhere: their difference is a part of the spread, at most so many
+    /// standard deviations of it.
     #[must_use]
-    pub(super) fn with_other(self, pose: PlanarPose, other: PlanarPose) -> Self {
+    pub(super) fn with_other(self, pose: PlanarPose, other: PlanarPose, most: f64) -> Self {
         let turned = crate::units::wrap_angle(other.theta_rad - pose.theta_rad);
         let off = Vector3::new(turned, other.y_m - pose.y_m, other.z_m - pose.z_m);
-        let covariance = Matrix3::from(self.covariance) + off * off.transpose();
+        let covariance = Matrix3::from(self.covariance);
+        let deviations = covariance.try_inverse().map_or(0.0, |inverse| (off.transpose() * inverse * off)[0].sqrt());
+        let off = off * (most / deviations).min(1.0);
+        let covariance = covariance + off * off.transpose();
         Self { covariance: covariance.into(), ..self }
     }
 

@@ -17,7 +17,7 @@ use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::pose::{Registration, ToolModel};
 use touch2touch_core::rig::Rig;
-use touch2touch_core::units::{angle_error, mm};
+use touch2touch_core::units::mm;
 
 const WHAT: &str = "Export the pair";
 
@@ -73,7 +73,7 @@ pub fn write(parts: &PairParts<'_>, folder: &Path) -> Result<Vec<PathBuf>, TaskE
         ["cloud.ply", "pose.json", "mesh.stl"].map(|ending| folder.join(format!("{stem}.{ending}")));
     ply::write(&cloud, &points(parts), &comments(parts)).map_err(|err| fail(err.to_string(), &cloud))?;
     let Some((pose, (_, tool))) = parts.pose.zip(parts.tool) else { return Ok(vec![cloud]) };
-    let text = pose_json(parts, pose).map_err(|err| fail(err.to_string(), &json))?;
+    let text = pose_json(parts, pose, tool).map_err(|err| fail(err.to_string(), &json))?;
     atomic::write_bytes(&json, text.as_bytes()).map_err(|err| fail(err.to_string(), &json))?;
     let motion = pose.grasp_from_object.to_affine();
     let vertices = tool.mesh.vertices.iter().map(|p| motion.transform_point3(*p)).collect();
@@ -118,15 +118,14 @@ fn points(parts: &PairParts<'_>) -> Vec<PlyPoint> {
     all
 }
 
-fn pose_json(parts: &PairParts<'_>, pose: &PoseResult) -> serde_json::Result<String> {
-    let (found, back) = (pose.grasp_from_object, pose.object_from_grasp());
+fn pose_json(parts: &PairParts<'_>, pose: &PoseResult, tool: &ToolModel) -> serde_json::Result<String> {
+    let back = pose.object_from_grasp();
     let truth = parts.truth.map(|truth| {
-        let back = truth.inverse();
+        let (back, off) = (truth.inverse(), pose.off(truth, tool));
         json!({
             "grasp_from_object": matrix(pose.grasp_from_cad_at(truth)),
             "theta_deg": back.theta_rad.to_degrees(), "y_mm": mm(back.y_m), "z_mm": mm(back.z_m),
-            "error_deg": angle_error(found.theta_rad, truth.theta_rad).to_degrees(),
-            "error_mm": mm((found.y_m - truth.y_m).hypot(found.z_m - truth.z_m)),
+            "error_deg": off.angle_rad.to_degrees(), "error_mm": mm(off.position_m),
         })
     });
     serde_json::to_string_pretty(&json!({

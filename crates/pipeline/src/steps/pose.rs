@@ -7,6 +7,7 @@ use glam::{DAffine3, DVec3};
 use crate::error::TaskError;
 use touch2touch_core::align::{AlignReport, Ask, Contacts, Evidence, PointFit, Register, Scene, TraceStep};
 use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::manual::PoseDifference;
 use touch2touch_core::pose::ToolModel;
 use touch2touch_core::symmetry::Symmetry;
 use touch2touch_core::units;
@@ -60,6 +61,11 @@ impl PoseResult {
     /// Standard deviation of the angle, radians, where the evidence was asked for.
     pub fn angle_sd_rad(&self) -> Option<f64> {
         Some(self.report.evidence?.uncertainty.angle_rad())
+    }
+
+    /// Difference from the true pose, or from the nearest that the symmetry of the tool makes equal to it.
+    pub fn off(&self, truth: PlanarPose, tool: &ToolModel) -> PoseDifference {
+        Symmetry::of(tool).difference(self.grasp_from_object, truth)
     }
 
     /// `-2.1° ± 0.3°`.

@@ -10,6 +10,7 @@ use super::problem::{Patches, Problem};
 use crate::align::batch::State;
 use crate::align::search::{Cost, Progress, minimize};
 use crate::align::{AlignReport, Ask, Contacts, PadImage, Prior, Range, Scene, Uncertainty};
+use crate::contact::{FLAT_M, rise};
 use crate::mesh::sampling::spread;
 use crate::symmetry::Symmetry;
 use crate::tool::ToolModel;
@@ -31,11 +32,17 @@ const STEPS: usize = 20;
 /// Step that moves no point by more than about this ends a descent, meters.
 const STEP_M: f64 = 2e-5;
 
+/// Most of the difference between a pose by membranes and mask and the one that the membranes have alone that counts as error,
+/// standard deviations: where it is larger the membranes tell less than the mask. From fresh grasps under two laws.
+const MOST_OFF: f64 = 1.5;
+
 /// Evidence for and against a pose.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Evidence {
     /// Share of all contact points with a place that lie on the tool, 0 to 1. 0 without any.
     pub on_tool: f64,
+    /// True where one membrane measured no contact and another one did.
+    pub blank: bool,
     /// The membranes' part, where their images are known and show where the membranes would meet.
     pub membrane: Option<MembraneEvidence>,
     /// Spread of the errors that the pose may have.
@@ -98,25 +105,31 @@ impl Evidence {
             .filter(|&&i| tool.field.sample(object_from_grasp.transform_yz(*finite[i])).distance <= ON_TOOL_M);
         let on_tool = on.count() as f64 / chosen.len().max(1) as f64;
         let config = JointConfig { range: report.range };
-        // In the prior as its ladder looks at it, unless other poses are to be compared with it.
-        let wide = !report.ends.is_empty() || !Prior::default().allows(pose);
-        let problem = Problem::new(scene, tool, config, Ask::default(), wide).ok().flatten();
+        let problem = |wide| Problem::new(scene, tool, config, Ask::default(), wide).ok().flatten();
+        // In the prior as its ladder looks at it; where other poses are to be compared with it, both as one looks at those.
+        let beyond = !Prior::default().allows(pose);
+        let among_all = (!beyond && !report.ends.is_empty()).then(|| problem(true)).flatten();
+        let problem = problem(beyond);
         let found = problem.as_ref().map(|problem| problem.evidence(scene, State::from_pose(pose, problem.centroid())));
         let by_membrane = report.joint.is_some_and(|fit| fit.basis.has_membrane());
+        let of_mask = || Uncertainty::of_mask(scene.yz(), &tool.field, pose);
         let uncertainty = match (&problem, found) {
-            (Some(problem), _) if by_membrane => problem.uncertainty(pose),
             (Some(problem), Some((_, own))) => {
-                Uncertainty::of_mask(scene.yz(), &tool.field, pose).with_other(pose, own.to_pose(problem.centroid()))
+                let (spread, most) =
+                    if by_membrane { (problem.uncertainty(pose), MOST_OFF) } else { (of_mask(), f64::INFINITY) };
+                spread.with_other(pose, own.to_pose(problem.centroid()), most)
             }
-            _ => Uncertainty::of_mask(scene.yz(), &tool.field, pose),
+            _ => of_mask(),
         };
         let membrane = found.map(|(evidence, _)| evidence);
-        let answers = match &problem {
+        let answers = match among_all.as_ref().or(problem.as_ref()) {
             _ if report.range == Range::LAB => Vec::new(),
             Some(problem) if by_membrane => problem.answers(report, &Symmetry::of(tool)),
             _ => shared(vec![(pose, 1.0)], &Symmetry::of(tool), report.range),
         };
-        (Self { on_tool, membrane, uncertainty }, answers)
+        let touched = scene.images().iter().filter(|image| rise(image.imprint) >= FLAT_M).count();
+        let blank = (1..scene.images().len()).contains(&touched);
+        (Self { on_tool, blank, membrane, uncertainty }, answers)
     }
 
     /// Adds the evidence about its answer to a report, and the other answers.

@@ -13,7 +13,6 @@ use crate::steps::tool::Tools;
 use touch2touch_core::grid::{DepthMap, Grid};
 use touch2touch_core::metrics::AngleSummary;
 use touch2touch_core::rig::PerPad;
-use touch2touch_core::units::angle_error;
 
 /// Most grasps that are posed: enough for a mean, and a matter of seconds.
 const MOST_GRASPS: usize = 100;
@@ -53,8 +52,8 @@ pub(super) fn angles(
         }
         let estimate = Estimate::of_imprints(&setup.recipe, imprints).without_verdict();
         let estimate = estimate.reach(touch, Stage::Pose, models, cx);
-        let found = estimate.ok().and_then(|estimate| Some(estimate.pose().ok()?.angle_rad));
-        errors.push(found.map_or(f64::NAN, |found| angle_error(found, truth.inverse().theta_rad)));
+        let off = estimate.ok().and_then(|estimate| Some(estimate.pose().ok()?.off(truth, tool)));
+        errors.push(off.map_or(f64::NAN, |off| off.angle_rad));
     }
     Ok((!errors.is_empty()).then(|| AngleSummary::from_errors(&errors)))
 }

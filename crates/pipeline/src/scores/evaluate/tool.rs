@@ -25,12 +25,10 @@ use touch2touch_core::dataset::Problem;
 use touch2touch_core::evaluation::{GraspScore, ImageScore, PEAK_M, Scores, squared_error};
 use touch2touch_core::grid::{DepthMap, Grid, RgbGrid};
 use touch2touch_core::label::iou;
-use touch2touch_core::manual::PoseDifference;
 use touch2touch_core::metrics::{LEVELS, SsimRange, planes, ssim, unit_range};
 use touch2touch_core::pose::ToolModel;
 use touch2touch_core::rig::{PadId, PerPad};
 use touch2touch_core::sample::{Sample, Scale};
-use touch2touch_core::units::angle_error;
 use touch2touch_core::verdict::Grade;
 
 /// A prediction that waits for its image figures.
@@ -251,13 +249,10 @@ impl<'a> Tool<'a> {
         let truth = Estimate::compared_with(touch, estimate.recipe(), models, cx).map_err(|err| err.why)?;
         let estimate = estimate.reach(touch, Stage::Pose, models, cx).map_err(|err| err.why)?;
         let found = estimate.pose().ok();
-        let both = found.zip(truth);
-        let apart = both.map(|(found, truth)| PoseDifference::between(found.grasp_from_object, truth));
+        let off = found.zip(truth).zip(touch.tool.ok()).map(|((found, truth), tool)| found.off(truth, tool));
         Ok(Judged {
-            // As a pose tells its own error, bit for bit.
-            angle_error_rad: truth
-                .map(|truth| found.map_or(f64::NAN, |found| angle_error(found.angle_rad, truth.inverse().theta_rad))),
-            position_error_m: apart.map(|apart| apart.position_m),
+            angle_error_rad: truth.map(|_| off.map_or(f64::NAN, |off| off.angle_rad)),
+            position_error_m: off.map(|off| off.position_m),
             verdict: found.and_then(|found| Some(found.verdict.as_ref()?.grade)),
         })
     }
