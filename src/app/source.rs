@@ -88,11 +88,10 @@ impl Source {
     /// # Errors
     /// With the file and the reason if it cannot be read.
     pub fn load(&self, pair: PairId) -> Result<Sample, TaskError> {
-        let loaded = self.dataset.load_with_counts(pair).map_err(|err| {
+        self.dataset.load(pair).map_err(|err| {
             let name = self.dataset.index.get(pair).map_or("a pair", |entry| &entry.name);
             TaskError::from_error(format!("Load {name}"), &err).with_hint(err.hint)
-        })?;
-        Ok(loaded.sample)
+        })
     }
 
     /// Writes labels that could not be written where they belong into a folder; `None` = where they wait for the next opening.

@@ -202,10 +202,7 @@ fn vertices(mesh: &TriMesh, shading: Shading, values: &[f32]) -> Vec<MeshVertex>
     let areas: Vec<DVec3> = faces.iter().map(|[a, b, c]| (*b - *a).cross(*c - *a)).collect();
     let normals: Vec<DVec3> = areas.iter().map(|area| area.normalize_or_zero()).collect();
     let mut around: FxHashMap<[u64; 3], Vec<usize>> = FxHashMap::default();
-    let crease = match shading {
-        Shading::Smooth => CREASE_RAD.cos(),
-        Shading::Round => -2.0,
-    };
+    let crease = if shading == Shading::Round { -2.0 } else { CREASE_RAD.cos() };
     for (f, face) in faces.iter().enumerate() {
         for p in face {
             around.entry(place(*p)).or_default().push(f);

@@ -61,8 +61,11 @@ pub(crate) fn simulate_apart(
 ) -> Sample {
     let (gelslims, bubbles) = (gelslims.object_from_grasp(), bubbles.object_from_grasp());
     let touch = |finger| {
-        let felt = PadTouch::default()
-            .with(lab::GELSLIM_ID, Some(gelslim::touch(&config.gelslim, tool, gelslims, finger, seed)));
+        if config.first_bubble_alone && finger != lab::PADS[0] {
+            return None;
+        }
+        let gelslim = || gelslim::touch(&config.gelslim, tool, gelslims, finger, seed);
+        let felt = PadTouch::default().with(lab::GELSLIM_ID, (!config.first_bubble_alone).then(gelslim));
         let membrane = Membrane::press(&config.bubble, tool, bubbles, finger);
         Some(felt.with(lab::BUBBLE_ID, Some(bubble_touch(&config.bubble, tool, &membrane, finger, seed))))
     };

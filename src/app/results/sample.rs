@@ -79,9 +79,10 @@ impl Computes for ThumbnailKey {
         let (source, pair) = (state.library.open.as_ref()?.source.clone(), self.0.pair);
         let loaded = state.results.samples.get(&self.0).cloned();
         let what = format!("Picture of {}", state.library.entry(pair)?.name);
-        Some(Job::new(Worker::Files, what, move |_| match loaded {
-            Some(sample) => Ok(imprint::thumbnail(&sample)),
-            None => Ok(imprint::thumbnail(&source.load(pair)?)),
+        Some(Job::new(Worker::Files, what.clone(), move |_| {
+            let read = loaded.map_or_else(|| source.dataset.load_first_bubble(pair).map(Arc::new), Ok);
+            let thumbnail = read.map(|sample| imprint::thumbnail(&sample));
+            thumbnail.map_err(|err| TaskError::from_error(what, &err).with_hint(err.hint))
         }))
     }
 }

@@ -14,6 +14,8 @@ pub struct SimConfig {
     pub bubble: BubbleConfig,
     /// The GelSlims.
     pub gelslim: GelSlimConfig,
+    /// True where the first finger's bubble alone is simulated, for a small picture.
+    pub first_bubble_alone: bool,
 }
 
 /// Press of the nominal bubble, at which its camera is as far from the tool as the rig says.
@@ -326,6 +328,6 @@ impl SimConfig {
             noise: g.noise.map(|deviation| around(deviation, 0.5)),
             sensor_seed: seed ^ 0x5EED_6E15,
         };
-        Self { bubble, gelslim }
+        Self { bubble, gelslim, ..Self::default() }
     }
 }

@@ -259,6 +259,15 @@ impl Dataset {
         self.load_with_counts(id).map(|loaded| loaded.sample)
     }
 
+    /// [`Dataset::load`] for a small picture: a simulated pair has the first finger's bubble alone.
+    ///
+    /// # Errors
+    /// As [`Dataset::load`].
+    pub fn load_first_bubble(&self, id: PairId) -> Result<Sample, FileError> {
+        let Source::BuiltIn(set) = &self.source else { return self.load(id) };
+        set.load(id, true).ok_or_else(|| error::no_such_pair(id))
+    }
+
     /// [`Dataset::load`], together with how many pixels are invalid.
     ///
     /// # Errors
@@ -269,7 +278,7 @@ impl Dataset {
         }
         let read = || {
             let mut loaded = match (&self.source, self.files.get(id.0 as usize)) {
-                (Source::BuiltIn(set), _) => set.load(id).map(|sample| Loaded { sample, ..Loaded::default() }),
+                (Source::BuiltIn(set), _) => set.load(id, false).map(|sample| Loaded { sample, ..Loaded::default() }),
                 (_, Some(Files::Lab(halves))) => Some(halves.load()?),
                 (_, Some(Files::Row(row))) => Some(row.load(&self.rig)?),
                 (_, Some(Files::Pictures(touch))) => Some(touch.load(&self.rig)?),

@@ -75,8 +75,9 @@ impl BuiltIn {
         (0..catalog::tools().len()).flat_map(|at| (0..self.grasps()).filter_map(move |n| one(at, n))).collect()
     }
 
-    /// Renders a pair; `None` beyond the last.
-    pub(super) fn load(self, id: PairId) -> Option<Sample> {
+    /// Renders a pair, or the first finger's bubble alone; `None` beyond the last.
+    pub(super) fn load(self, id: PairId, first_bubble_alone: bool) -> Option<Sample> {
+        let config = &SimConfig { first_bubble_alone, ..SimConfig::default() };
         let id = u64::from(id.0);
         let (at, number) = (usize::try_from(id / self.grasps()).ok()?, id % self.grasps());
         let tool = self.tool(at, number)?;
@@ -84,11 +85,11 @@ impl BuiltIn {
             Self::Demo => {
                 // Grasps and noise of the demo are drawn from seeds of their own.
                 let seed = 0x00de_3000 + id;
-                sim::simulate(&tool, sim::random_grasp(seed), seed, &SimConfig::default())
+                sim::simulate(&tool, sim::random_grasp(seed), seed, config)
             }
             Self::TestSet(condition) => {
                 let (grasp, seed) = sim::test_grasp(at, number);
-                condition.simulate(&tool, grasp, seed, &SimConfig::default())
+                condition.simulate(&tool, grasp, seed, config)
             }
         })
     }
@@ -122,9 +123,12 @@ mod tests {
                 assert!(mesh(tool).is_some(), "{tool}");
             }
             let last = PairId(u32::try_from(pairs.len()).unwrap() - 1);
-            let sample = set.load(last).unwrap();
-            assert!(sample.pad(lab::LEFT).unwrap().depth().unwrap().truth.is_some());
-            assert!(set.load(PairId(last.0 + 1)).is_none());
+            let sample = set.load(last, false).unwrap();
+            let [right, left] = lab::PADS.map(|pad| sample.pad(pad).unwrap().depth().unwrap());
+            let alone = set.load(last, true).unwrap();
+            assert_eq!(alone.pad(lab::PADS[0]).unwrap().depth().unwrap().imprint, right.imprint);
+            assert!(left.truth.is_some() && alone.pad(lab::LEFT).is_none());
+            assert!(set.load(PairId(last.0 + 1), false).is_none());
         }
         for no in ["", "test-set-", "test-set-odd", "test-sets", "Demo"] {
             assert_eq!(BuiltIn::named(no), None, "{no:?}");
