@@ -49,10 +49,6 @@ fn angle_mesh() -> TriMesh {
     ])
 }
 
-fn rod_mesh() -> TriMesh {
-    cuboid(DVec3::ZERO, DVec3::new(0.0025, 0.0025, 0.03))
-}
-
 fn tool(mesh: TriMesh) -> ToolModel {
     ToolModel::new(mesh).unwrap()
 }
@@ -98,11 +94,7 @@ fn solve(
     engine: Registration,
 ) -> Result<AlignReport, AlignError> {
     let points = lifted(case, imprints, masks).map(|pad| pad.points).concat();
-    register(&points, case_tool(), engine, false)
-}
-
-fn case_tool() -> &'static ToolModel {
-    case().1
+    register(&points, case().1, engine, false)
 }
 
 #[test]
@@ -231,7 +223,7 @@ fn e06_a_tool_in_another_unit_is_refused_and_after_the_offer_the_same() {
 
 #[test]
 fn e07_what_is_not_observable_is_flagged_and_stays_where_it_was() {
-    let model = tool(rod_mesh());
+    let model = tool(cuboid(DVec3::ZERO, DVec3::new(0.0025, 0.0025, 0.03)));
     for seed in 0..12u64 {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let degrees = rng.random_range(-20.0..20.0);

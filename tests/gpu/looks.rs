@@ -36,8 +36,7 @@ fn a_still_has_smooth_edges_and_parts_that_fit() {
         *vertex = turn.transform_point3(*vertex);
     }
     let data = SceneData { meshes: vec![mesh_item(mesh, style)], background: [0.0; 3], ..scene() };
-    let mut still = Still::of_scene(data.clone(), camera, [160, 160]).unwrap();
-    let picture = still.picture(&camera).unwrap();
+    let picture = Still::of_scene(data.clone(), camera, [160, 160]).unwrap().picture(&camera).unwrap();
     let reds: std::collections::BTreeSet<u8> = picture.rgba.chunks_exact(4).map(|p| p[0]).collect();
     assert!(reds.len() > 8, "between black and white lie the steps of an edge: {reds:?}");
     // The same picture in quarters.

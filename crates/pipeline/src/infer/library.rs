@@ -42,8 +42,8 @@ fn library_in(dir: &Path) -> Option<PathBuf> {
 /// The library's own file, not one that it loads.
 fn is_library(file: &str) -> bool {
     let plain = file.strip_prefix("lib").unwrap_or(file);
-    let end = plain.strip_prefix("onnxruntime");
-    end.is_some_and(|end| end.starts_with('.') && [".so", ".dylib", ".dll"].iter().any(|ext| end.contains(ext)))
+    let end = plain.strip_prefix("onnxruntime.").map(|end| end.trim_matches(|c: char| c == '.' || c.is_ascii_digit()));
+    matches!(end, Some("so" | "dylib" | "dll"))
 }
 
 /// Package folders of the Pythons that can be found without starting one.
@@ -77,4 +77,14 @@ fn python_onnxruntime() -> Option<PathBuf> {
     let text = String::from_utf8(output.stdout).ok()?;
     let text = text.trim();
     (output.status.success() && !text.is_empty()).then(|| PathBuf::from(text))
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn a_packed_library_is_none() {
+        let names = ["libonnxruntime.so.1.31.1", "libonnxruntime.1.31.1.dylib", "onnxruntime.dll"];
+        assert!(names.into_iter().all(super::is_library));
+        assert!(!super::is_library("libonnxruntime.so.1.31.1.xz") && !super::is_library("libonnxruntime_providers.so"));
+    }
 }
