@@ -94,7 +94,7 @@ fn solve(
     engine: Registration,
 ) -> Result<AlignReport, AlignError> {
     let points = lifted(case, imprints, masks).map(|pad| pad.points).concat();
-    register(&points, case().1, engine, false)
+    register(&points, self::case().1, engine, false)
 }
 
 #[test]

@@ -236,7 +236,7 @@ fn job(cx: &mut Cx<'_>, ui: &mut Ui, ticket: Ticket, task: &RunningTask) {
         cx.push(TasksCommand::Cancel(ticket));
     }
     let text = if task.cancelling { "stopping…" } else { &task.progress.text };
-    progress::bar(ui, 150.0, task.progress.fraction(), text);
+    progress::bar(ui, 220.0, task.progress.fraction(), text);
     ui.label(RichText::new(&task.title).size(12.0).color(cx.p.text));
 }
 
