@@ -42,7 +42,7 @@ impl Grade {
 }
 
 /// Limits of one sign: beyond the first a pose is to be checked, beyond the second it is wrong. All from right poses on fresh
-/// simulated grasps, of which about two of a hundred are doubted (`touch2touch-bench verdict`).
+/// simulated grasps, of which about three of a hundred are doubted (`touch2touch-bench verdict`).
 type Limits = [f64; 2];
 
 /// Limits of the signs whose meaning depends on the membranes.
