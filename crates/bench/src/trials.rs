@@ -31,6 +31,7 @@ use insertion::passes;
 use outline::Outline;
 use stacking::stands;
 use touch2touch::headless::{ModelArgs, Output, VerbResult, at_least_one};
+use touch2touch_core::align::PLACE_OPEN_M;
 use touch2touch_core::catalog::{ToolSpec, tools};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::frames::PlanarPose;
@@ -55,8 +56,6 @@ const TRIAL_SEED: u64 = 0x7e1a_1000_0000_0000 + 1_000_003;
 const GIVE_RAD: f64 = 2.0 / 180.0 * std::f64::consts::PI;
 /// Room to each side of the upright tool in its hole, meters.
 const ROOM_M: f64 = 0.001;
-/// Standard deviation across the tool up to which its place is known, meters.
-const PLACE_M: f64 = 2e-3;
 
 /// Arguments of `bench trials`.
 #[derive(Debug, Args)]
@@ -262,7 +261,7 @@ impl Hand<'_> {
                 // Where a tool is along its own axis is no fault: it is let down along it until it meets something.
                 let (pose, evidence) = (found.grasp_from_object, found.report.evidence.as_ref());
                 let across_m = evidence.map(|e| e.uncertainty.along_m(pose, DVec2::from_angle(pose.theta_rad)));
-                let is_known = across_m.is_some_and(|across_m| across_m <= PLACE_M);
+                let is_known = across_m.is_some_and(|across_m| across_m <= PLACE_OPEN_M);
                 let counts = |sign: &&Sign| !(is_known && sign.kind == SignKind::PlaceOpen);
                 let worst = |verdict: &Verdict| verdict.against.iter().filter(counts).map(|sign| sign.grade).max();
                 let grade = found.verdict.as_ref().map(|verdict| worst(verdict).unwrap_or(Grade::Good));

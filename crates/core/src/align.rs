@@ -42,8 +42,7 @@ pub(crate) use observability::DEGENERATE_BELOW;
 pub use observability::{Observability, observability};
 pub use planar::align;
 pub use register::{Ask, Contacts, PadImage, Register, Scene};
-pub(crate) use uncertainty::PLACE_OPEN_M;
-pub use uncertainty::Uncertainty;
+pub use uncertainty::{PLACE_OPEN_M, Uncertainty};
 
 /// Length that makes an angle comparable with a shift: one radian counts as this many meters.
 ///

@@ -1,4 +1,4 @@
-//! What several modules test on: a camera of the lab's rig, a view from above, a sheet of points.
+//! Fixtures of several modules' tests: a camera of the lab's rig, a view from above, a sheet of points.
 
 use glam::{DAffine3, DMat3, DMat4, DVec3, DVec4};
 

@@ -270,7 +270,7 @@ fn signs(report: &AlignReport, evidence: &Evidence, place_m: f64) -> Vec<Sign> {
         let what = format!("the contact does not match this tool (similarity {likeness:.2}, {off} of it off the tool)");
         sign(Misfit, [grade; 2], what);
     }
-    // Where the membranes have the tool's shape it is the mask that is off, not the pose.
+    // A mask off the tool is no fault of the pose where the membranes have the tool's shape.
     if !matches {
         sign(OffTool, [Grade::of(off, OFF); 2], format!("{} of the contact mask lies off the tool", percent(off)));
     }

@@ -124,6 +124,7 @@ pub fn notes(dataset: &Dataset) -> Vec<Problem> {
 ///
 /// # Errors
 /// In words, with what seems wrong.
+#[cfg(any(test, feature = "tune"))]
 pub(crate) fn check_truth(dataset: &Dataset, what: &str) -> Result<(), TaskError> {
     let doubts = examine_reading(dataset, PAIRS, None, &JobCx::unwatched());
     match doubts.into_iter().find(|doubt| doubt.cause.is_of_poses()) {

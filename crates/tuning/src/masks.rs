@@ -161,8 +161,8 @@ pub struct MaskTuner {
 }
 
 impl MaskTuner {
-    /// Before the first step, or where the run stood that [`crate::Descent::to_bytes`] kept as `state`: to the last bit as if it had
-    /// not been stopped.
+    /// Before the first step, or where the run stood that [`crate::Descent::to_bytes`] kept as `state`: to the last bit as if
+    /// it had not been stopped.
     ///
     /// # Errors
     /// If the network is of another architecture (which weight says so), a setting is out of range, there are no touches,

@@ -50,9 +50,9 @@ pub trait Descent {
     fn to_bytes(&self) -> Vec<u8>;
 }
 
-/// [`Descent`] of types with a `trainer` and the `origin` of its state.
+/// [`Descent`] of a type with a `trainer` and the `origin` of its state.
 macro_rules! descend {
-    ($($of:ty),+) => {$(
+    ($of:ty) => {
         impl $crate::Descent for $of {
             fn step(&mut self) -> $crate::Result<$crate::trainer::StepReport> {
                 self.trainer.step()
@@ -70,7 +70,7 @@ macro_rules! descend {
                 self.trainer.to_bytes(self.origin)
             }
         }
-    )+};
+    };
 }
 pub(crate) use descend;
 

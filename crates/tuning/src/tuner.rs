@@ -96,8 +96,8 @@ pub struct Tuner {
 }
 
 impl Tuner {
-    /// Before the first step, or where the run stood that [`crate::Descent::to_bytes`] kept as `state`: to the last bit as if it had
-    /// not been stopped.
+    /// Before the first step, or where the run stood that [`crate::Descent::to_bytes`] kept as `state`: to the last bit as if
+    /// it had not been stopped.
     ///
     /// # Errors
     /// If the bundle is of another architecture (which weight says so), if a setting is out of range, if there are no

@@ -68,10 +68,8 @@ pub fn bubble(state: &State, finger: PadId) -> Lookup<'_, DepthTouch> {
 /// Difference of a pose, `grasp_from_object`, from the true one of the selected pair, up to the tool's symmetry, where it is known.
 pub fn off_truth(state: &State, pose: PlanarPose) -> Option<PoseDifference> {
     let (truth, tool) = (sample(state).ready()?.grasp_from_object?, tool(state).ready());
-    Some(match tool {
-        Some(tool) => Symmetry::of(&tool.model).difference(pose, truth),
-        None => PoseDifference::between(pose, truth),
-    })
+    let plain = || PoseDifference::between(pose, truth);
+    Some(tool.map_or_else(plain, |tool| Symmetry::of(&tool.model).difference(pose, truth)))
 }
 
 impl Computes for ThumbnailKey {

@@ -11,7 +11,7 @@ use crate::frames::PlanarPose;
 
 /// Standard deviation of a place, where it is known least, beyond which the contact leaves it open, meters. The gripper alone knows
 /// it to 2.9 mm.
-pub(crate) const PLACE_OPEN_M: f64 = 1.75e-3;
+pub const PLACE_OPEN_M: f64 = 1.75e-3;
 
 /// Spread of the errors of a pose, as a normal distribution about it.
 ///

@@ -259,13 +259,12 @@ impl Dataset {
         self.load_with_counts(id).map(|loaded| loaded.sample)
     }
 
-    /// [`Dataset::load`] for a small picture: a simulated pair has the first finger's bubble alone.
+    /// [`Dataset::load`] for a small picture: a simulated pair has the first finger's bubble alone, unless it is read otherwise.
     ///
     /// # Errors
     /// As [`Dataset::load`].
     pub fn load_first_bubble(&self, id: PairId) -> Result<Sample, FileError> {
-        let Source::BuiltIn(set) = &self.source else { return self.load(id) };
-        set.load(id, true).ok_or_else(|| error::no_such_pair(id))
+        self.read(id, self.read_as.is_empty()).map(|loaded| loaded.sample)
     }
 
     /// [`Dataset::load`], together with how many pixels are invalid.
@@ -273,12 +272,17 @@ impl Dataset {
     /// # Errors
     /// As [`Dataset::load`].
     pub fn load_with_counts(&self, id: PairId) -> Result<Loaded, FileError> {
+        self.read(id, false)
+    }
+
+    /// Of a simulated pair the first finger's bubble `alone`, where that is asked for.
+    fn read(&self, id: PairId, alone: bool) -> Result<Loaded, FileError> {
         if self.index.get(id).is_none() {
             return Err(error::no_such_pair(id));
         }
-        let read = || {
+        self.catch_panic(id, || {
             let mut loaded = match (&self.source, self.files.get(id.0 as usize)) {
-                (Source::BuiltIn(set), _) => set.load(id, false).map(|sample| Loaded { sample, ..Loaded::default() }),
+                (Source::BuiltIn(set), _) => set.load(id, alone).map(|sample| Loaded { sample, ..Loaded::default() }),
                 (_, Some(Files::Lab(halves))) => Some(halves.load()?),
                 (_, Some(Files::Row(row))) => Some(row.load(&self.rig)?),
                 (_, Some(Files::Pictures(touch))) => Some(touch.load(&self.rig)?),
@@ -293,8 +297,7 @@ impl Dataset {
             plausible::notes(&mut loaded, &file);
             self.lend_cameras(&mut loaded.sample);
             Ok(loaded)
-        };
-        catch_panic(read).unwrap_or_else(|message| Err(error::bug(&self.pair_files(id), &message)))
+        })
     }
 
     /// Reads something of a pair. A panic is that pair's error: no file may end a run over others.

@@ -106,7 +106,8 @@ impl Evidence {
         let on_tool = on.count() as f64 / chosen.len().max(1) as f64;
         let config = JointConfig { range: report.range };
         let problem = |wide| Problem::new(scene, tool, config, Ask::default(), wide).ok().flatten();
-        // In the prior as its ladder looks at it; where other poses are to be compared with it, both as one looks at those.
+        // A pose in the prior is judged with the templates that its ladder registered it with: those of turned grasps fit
+        // worse. Answers are weighed all with those of turned grasps.
         let beyond = !Prior::default().allows(pose);
         let among_all = (!beyond && !report.ends.is_empty()).then(|| problem(true)).flatten();
         let problem = problem(beyond);
