@@ -233,7 +233,7 @@ fn every_pane_says_a_command_that_the_program_understands() {
     let mut studio = Studio::open(Place::Demo, home.path());
     studio.send(LibraryCommand::Select(PairId(3)).into());
     let mut said = 0;
-    for shift in ShiftMode::ALL {
+    for shift in ShiftMode::iter() {
         studio.send(prefer(move |s| s.shift = shift).into());
         for source in MaskSource::iter() {
             let choice = MaskChoice { source, ..MaskChoice::default() };

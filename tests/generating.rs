@@ -15,7 +15,7 @@ use touch2touch_pipeline::infer::engine::EngineChoice;
 use touch2touch_pipeline::infer::generator::{GenerateError, Generator, Item, Observer};
 use touch2touch_pipeline::job::JobCx;
 use touch2touch_pipeline::steps::bundles::{self, BundleInfo};
-use touch2touch_pipeline::steps::models::{GenerateInput, Models};
+use touch2touch_pipeline::steps::models::{GenerateInput, Generating, Models};
 
 use crate::models::running::{config, go_on, largest_difference};
 use crate::support::tiny;
@@ -160,14 +160,16 @@ fn a_prediction_is_found_again_after_a_restart_and_never_for_another_image() {
     let (a, b) = (image(0.0), image(1.0));
     let services = start();
     let info = bundle();
+    let choices = config();
+    let generating = Generating { bundle: &info, engine: EngineChoice::Rten, config: &choices };
     let item = |seed, difference| GenerateInput { difference, seed, size: [0, 0] };
     assert!(services.models.kept(std::slice::from_ref(&info), EngineChoice::Rten, &a).is_empty());
     let both = [item(1, &a), item(1, &b)];
-    let made = services.models.predict(&info, EngineChoice::Rten, &config(), &both, &cx).unwrap();
+    let made = services.models.predict(generating, &both, &cx).unwrap();
     assert!(made.iter().all(|m| !m.kept));
 
     let again = start();
-    let found = again.models.predict(&info, EngineChoice::Rten, &config(), &both, &cx).unwrap();
+    let found = again.models.predict(generating, &both, &cx).unwrap();
     assert!(found.iter().all(|m| m.kept), "read, not made");
     for (made, found) in made.iter().zip(&found) {
         assert_eq!(made.raw, found.raw);
@@ -180,10 +182,10 @@ fn a_prediction_is_found_again_after_a_restart_and_never_for_another_image() {
     // The same pair and finger with another image (another data set of the same names) is another touch.
     assert!(again.models.kept(std::slice::from_ref(&info), EngineChoice::Rten, &image(2.0)).is_empty());
     let another = image(2.0);
-    let other = again.models.predict(&info, EngineChoice::Rten, &config(), &[item(1, &another)], &cx).unwrap();
+    let other = again.models.predict(generating, &[item(1, &another)], &cx).unwrap();
     assert!(!other[0].kept && other[0].raw != made[0].raw);
     // Half known, half new: only the new one is made. Another engine's results are not taken for this one's.
-    let half = again.models.predict(&info, EngineChoice::Rten, &config(), &[item(2, &a), item(1, &b)], &cx).unwrap();
+    let half = again.models.predict(generating, &[item(2, &a), item(1, &b)], &cx).unwrap();
     assert!(!half[0].kept && half[1].kept);
     assert_eq!(again.models.kept(std::slice::from_ref(&info), EngineChoice::Rten, &a).len(), 2);
     assert!(again.models.kept(&[], EngineChoice::Rten, &a).is_empty(), "its bundle is gone");
@@ -196,7 +198,7 @@ fn a_prediction_is_found_again_after_a_restart_and_never_for_another_image() {
     let mut settings = services.load_settings().0;
     settings.cache_mib = 0;
     services.save_settings(&settings).unwrap();
-    let made_again = services.models.predict(&info, EngineChoice::Rten, &config(), &both, &cx).unwrap();
+    let made_again = services.models.predict(generating, &both, &cx).unwrap();
     assert!(made_again.iter().all(|m| !m.kept) && made_again[0].raw == made[0].raw);
     assert!(services.models.kept(std::slice::from_ref(&info), EngineChoice::Rten, &a).is_empty());
 }
@@ -212,14 +214,14 @@ fn many_threads_of_a_pool_predict_and_mask_with_one_model() {
         let difference = image(0.0);
         let predicted = |seed| {
             let wanted = [GenerateInput { difference: &difference, seed, size: [0, 0] }];
-            let config = config();
-            models.predict(&generator, EngineChoice::Rten, &config, &wanted, &JobCx::unwatched()).unwrap().remove(0).raw
+            let generating = Generating { bundle: &generator, engine: EngineChoice::Rten, config: &config() };
+            models.predict(generating, &wanted, &JobCx::unwatched()).unwrap().remove(0).raw
         };
         let alone: Vec<RawPrediction> = (0..32).map(predicted).collect();
         let together: Vec<RawPrediction> = (0..32).into_par_iter().map(predicted).collect();
         assert_eq!(alone, together);
         let imprint = Grid::from_fn(175, 140, |x, y| if (60..90).contains(&x) && y > 40 { 0.01 } else { 0.0 });
-        let masked = |_| models.mask(&mask, EngineChoice::Rten, &imprint, None).unwrap();
+        let masked = |_| models.mask(&mask, EngineChoice::Rten, &imprint).unwrap();
         assert!((0..32).into_par_iter().map(masked).collect::<Vec<_>>().windows(2).all(|pair| pair[0] == pair[1]));
         done.send(()).unwrap();
     });

@@ -280,7 +280,7 @@ pub(crate) mod running {
         let bundle = Bundle::open(&tiny("generator")).unwrap();
         let mut generator = Generator::open(&bundle, EngineChoice::Auto).unwrap();
         let raw = generator.generate(&image(), &config(), &mut go_on).unwrap();
-        let depth = |mode| generator.depth(&raw, mode).unwrap();
+        let depth = |mode| generator.spec().depth_chain(mode).unwrap().run(&raw).unwrap();
         let (saved, exact) = (depth(ShiftMode::Raw), depth(ShiftMode::ExactInverse));
         assert_eq!(saved.size(), [18, 14]);
         for (&r, &d) in saved.as_slice().iter().zip(exact.as_slice()) {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use serde_json::{Value, json as value};
 use touch2touch::app::command::{Command, Pane, PredictCommand, ViewCommand};
-use touch2touch::app::keys::{ImprintSource, ShiftMode};
+use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::library::Place;
 use touch2touch::app::runtime::Runtime;
 use touch2touch::app::services::Services;
@@ -14,7 +14,6 @@ use touch2touch::app::state::{Absent, Lookup, State};
 use touch2touch::app::tasks::Level;
 use touch2touch::app::{recipe, results};
 use touch2touch_core::grid::{Grid, RgbGrid};
-use touch2touch_core::postprocess::Picture;
 use touch2touch_core::rig::{PadId, Rig, SensorKind, lab};
 use touch2touch_pipeline::infer::bundle::{Bundle, Ends};
 use touch2touch_pipeline::infer::engine::EngineChoice;
@@ -99,7 +98,7 @@ fn the_studio_shows_a_predicted_color_picture() {
     let condition = results::touch(&state, lab::RIGHT).ready().unwrap().picture(lab::BUBBLE_ID).unwrap();
     let config = results::chosen(&state, lab::RIGHT).unwrap().config;
     let raw = generator.generate(&condition, &config, &mut |_| std::ops::ControlFlow::Continue(())).unwrap();
-    assert_eq!(generator.picture(&raw, ShiftMode::default()), Ok(Picture::Color(picture.clone())));
+    assert_eq!(generator.spec().color_chain().unwrap().run(&raw).as_ref(), Ok(picture));
     for absent in [
         results::imprint(&state, ImprintSource::Predicted, lab::RIGHT).without::<()>(),
         results::comparison(&state, lab::RIGHT).without(),

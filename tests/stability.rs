@@ -13,7 +13,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use strum::IntoEnumIterator as _;
 use touch2touch_bench::known::{Case, Suite};
-use touch2touch_core::align::{AlignConfig, AlignError, AlignReport, LabIcpConfig, LabModel, align, lab_icp};
+use touch2touch_core::align::{AlignConfig, AlignError, AlignReport, LabModel, align, lab_icp};
 use touch2touch_core::cloud::{Lifted, lift};
 use touch2touch_core::field::{DistanceField, FieldError};
 use touch2touch_core::frames::PlanarPose;
@@ -130,9 +130,7 @@ fn e04_a_large_offset_does_not_cost_the_angle() {
     let reference = align(&yz(&scene), &model.field, &near(pose(5.0, 0.0, 0.0))).unwrap().grasp_from_object;
     let lab = |offset: DVec2, scene: &[DVec3]| {
         let start = PlanarPose { y_m: offset.x, z_m: offset.y, ..pose(0.0, 0.0, 0.0) };
-        lab_icp(scene, &LabModel::of(&model), &LabIcpConfig { starts: vec![start], ..LabIcpConfig::default() })
-            .unwrap()
-            .grasp_from_object
+        lab_icp(scene, &LabModel::of(&model), &[start], false).unwrap().grasp_from_object
     };
     let lab_reference = lab(DVec2::ZERO, &scene);
     for offset in OFFSETS {
@@ -156,12 +154,13 @@ fn e05_the_scale_does_not_change_the_angle_or_is_an_error() {
     let mesh = angle_mesh();
     let scene = contacts(&mesh, 600, truth, 1e-4, 4);
     let surface = mesh.sample_surface(3000, 9);
-    let reference = lab_icp(&scene, &LabModel::new(&surface), &LabIcpConfig::default()).unwrap();
+    let identity = [PlanarPose::default()];
+    let reference = lab_icp(&scene, &LabModel::new(&surface), &identity, false).unwrap();
     for power in -6..=6 {
         let scale = 10f64.powi(power);
         // The lab's loop has no unit, except that contacts within a millimeter are one spot.
         let scaled = |v: &[DVec3]| v.iter().map(|p| *p * scale).collect::<Vec<_>>();
-        match lab_icp(&scaled(&scene), &LabModel::new(&scaled(&surface)), &LabIcpConfig::default()) {
+        match lab_icp(&scaled(&scene), &LabModel::new(&scaled(&surface)), &identity, false) {
             Ok(report) => {
                 let error = angle_error(report.grasp_from_object.theta_rad, reference.grasp_from_object.theta_rad);
                 assert!(error.to_degrees() < 1e-3, "scale {scale}: {} deg", error.to_degrees());
@@ -357,12 +356,12 @@ fn e11_axis_aligned_and_equal_model_points_do_not_panic() {
         let report = register(&scene, &model, engine, false).unwrap();
         assert!(report.grasp_from_object.is_finite(), "{engine}");
     }
-    let config = LabIcpConfig::default();
+    let identity = [PlanarPose::default()];
     let equal = vec![DVec3::new(0.0, 0.001, 0.002); 5000];
-    assert!(lab_icp(&scene, &LabModel::new(&equal), &config).unwrap().grasp_from_object.is_finite());
+    assert!(lab_icp(&scene, &LabModel::new(&equal), &identity, false).unwrap().grasp_from_object.is_finite());
     let same_y: Vec<DVec3> = (0..5000).map(|i| DVec3::new(0.0, 0.004, 1e-5 * f64::from(i))).collect();
-    assert!(lab_icp(&scene, &LabModel::new(&same_y), &config).unwrap().grasp_from_object.is_finite());
-    assert_eq!(lab_icp(&scene, &LabModel::new(&[]), &config), Err(AlignError::EmptyModel { got: 0 }));
+    assert!(lab_icp(&scene, &LabModel::new(&same_y), &identity, false).unwrap().grasp_from_object.is_finite());
+    assert_eq!(lab_icp(&scene, &LabModel::new(&[]), &identity, false), Err(AlignError::EmptyModel { got: 0 }));
     assert!(matches!(ToolModel::new(TriMesh::default()), Err(ToolError::Field(_))));
 }
 

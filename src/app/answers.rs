@@ -60,9 +60,7 @@ pub(super) fn step(state: &mut State, answer: Answer, effects: &mut Vec<Effect>)
             let current = state.library.is_open(seq);
             follow::arrived(state, followed, current, effects);
         }
-        Answer::Bundles(bundles, problems) => {
-            library::found(state, bundles, problems);
-        }
+        Answer::Bundles(bundles, problems) => library::found(state, bundles, problems),
         Answer::SettingsLoaded(settings, problem) => {
             state.settings = settings.validated();
             if let Some(problem) = problem {

@@ -5,7 +5,6 @@ use super::source::Followed;
 use super::state::State;
 use super::state::library::Follow;
 use super::state::results::{Request, Results};
-use super::state::tasks::Ticket;
 use super::{library, predict};
 use touch2touch_pipeline::error::TaskError;
 
@@ -16,12 +15,8 @@ pub enum FollowCommand {
     Set(bool),
 }
 
-pub(super) fn step(state: &mut State, FollowCommand::Set(on): FollowCommand, effects: &mut Vec<Effect>) {
-    set(state, on, effects);
-}
-
 /// Starts or stops following the folder that is open.
-fn set(state: &mut State, on: bool, effects: &mut Vec<Effect>) {
+pub(super) fn step(state: &mut State, FollowCommand::Set(on): FollowCommand, effects: &mut Vec<Effect>) {
     if on == state.library.follow.is_some() {
         return;
     }
@@ -43,7 +38,7 @@ pub(super) fn opened(state: &mut State, same_place: bool, effects: &mut Vec<Effe
     if state.library.follow.take().is_some() {
         effects.push(Effect::Follow(None));
         if same_place {
-            set(state, true, effects);
+            step(state, FollowCommand::Set(true), effects);
         }
     }
 }
@@ -89,15 +84,10 @@ pub(super) fn arrived(state: &mut State, followed: Followed, current: bool, effe
     }
     library::select(state, followed.pair, effects);
     // What still waits is of a touch that is not the newest any more; what runs ends.
-    let waiting = |ticket: &Ticket| {
-        let task = &state.tasks.running[ticket];
-        task.progress.total == 0 && task.recipes.first().is_some_and(|r| r.touch.pair != key)
-    };
-    let outdated: Vec<Ticket> = state.tasks.running.keys().copied().filter(waiting).collect();
-    for ticket in outdated {
-        if let Some(task) = state.tasks.running.get_mut(&ticket) {
+    for (ticket, task) in &mut state.tasks.running {
+        if task.progress.total == 0 && task.recipes.first().is_some_and(|r| r.touch.pair != key) {
             task.cancelling = true;
-            effects.push(Effect::Cancel(ticket));
+            effects.push(Effect::Cancel(*ticket));
         }
     }
     predict::same_seed(state, effects);

@@ -398,27 +398,25 @@ pub struct Read {
     pub(crate) past: JournalHistory,
 }
 
-/// The plan of an export, of what is drawn and marked now.
+/// The plan of what is done with what is drawn and marked now.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct MaskPlanKey {
+pub struct PlanKey<T> {
     /// The data set.
     pub dataset: DatasetSeq,
-    /// The choices.
-    pub choice: ExportChoice,
+    /// What is asked about.
+    pub choice: T,
     /// The last change of the document.
     pub revision: Revision,
 }
 
-/// The plan of an import, over what is drawn and marked now.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct ImportPlanKey {
-    /// The data set.
-    pub dataset: DatasetSeq,
-    /// The import that is asked about.
-    pub form: ImportForm,
-    /// The last change of the document.
-    pub revision: Revision,
-}
+/// The plan of an export.
+pub type MaskPlanKey = PlanKey<ExportChoice>;
+
+/// The plan of an import.
+pub type ImportPlanKey = PlanKey<ImportForm>;
+
+/// The plan of a training: the choice divides the pairs into those to learn from and those that are left out.
+pub type TrainPlanKey = PlanKey<TrainChoice>;
 
 /// An import of masks that is asked about: what it would change is said before anything changes.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -442,15 +440,4 @@ pub struct AboutKey {
     pub revision: Revision,
     /// The number of times that scores or units of tools changed.
     pub units_named: u64,
-}
-
-/// The plan of a training, on what is drawn and marked now.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct TrainPlanKey {
-    /// The data set.
-    pub dataset: DatasetSeq,
-    /// The division into pairs to learn from and pairs that are left out.
-    pub choice: TrainChoice,
-    /// The last change of the document.
-    pub revision: Revision,
 }

@@ -118,7 +118,9 @@ pub(super) fn step(state: &mut State, command: LabelsCommand, effects: &mut Vec<
             state.reorder();
         }
         LabelsCommand::SetNote(pair, text) => {
-            set_note(state, &pair, &text, effects);
+            if state.document.is_editable(&pair) {
+                change(state, &pair, LabelEdit::Note(&text), None, effects);
+            }
             state.reorder();
         }
         LabelsCommand::AcceptPose(source, accept) => accept_pose(state, source, accept, effects),
@@ -472,12 +474,6 @@ fn right_as_they_are(state: &State) -> Vec<TakenUp> {
         Some(TakenUp { place: results::mask_place(state, source, finger)?, mask })
     };
     state.fingers().into_iter().filter_map(of).collect()
-}
-
-fn set_note(state: &mut State, pair: &str, text: &str, effects: &mut Vec<Effect>) {
-    if state.document.is_editable(pair) {
-        change(state, pair, LabelEdit::Note(text), None, effects);
-    }
 }
 
 fn accept_pose(state: &mut State, source: ImprintSource, accept: bool, effects: &mut Vec<Effect>) {

@@ -20,6 +20,7 @@ use super::tasks::{self, Start};
 use super::{inspect, labels, results, settings};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::PadId;
+use touch2touch_core::units::counted;
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::io::dataset::ToolUnit;
 use touch2touch_pipeline::job::JobCx;
@@ -321,15 +322,14 @@ fn show(state: &mut State, seq: DatasetSeq, place: Place, source: &Arc<Source>, 
     state.workbench.leave_pair();
     inspect::rewind(state);
     let (pairs, problems) = (source.dataset.index.pairs.len(), source.problems.len());
-    let (level, hint) = match problems {
-        0 => (Level::Info, None),
-        _ => (Level::Warning, Some("The list of problems says which files, and what to do.".to_owned())),
+    let (level, found, hint) = match problems {
+        0 => (Level::Info, String::new(), None),
+        n => {
+            let hint = "The list of problems says which files, and what to do.".to_owned();
+            (Level::Warning, format!(", {}", counted(n, "problem")), Some(hint))
+        }
     };
-    let text = match problems {
-        0 => format!("{}: {pairs} pairs", source.dataset.title),
-        n => format!("{}: {pairs} pairs, {n} problem{}", source.dataset.title, if n == 1 { "" } else { "s" }),
-    };
-    state.log.push(level, text, None, hint);
+    state.log.push(level, format!("{}: {pairs} pairs{found}", source.dataset.title), None, hint);
     if let Some(text) = source.recovered.text() {
         let hint = "Undo takes them back, pair by pair.";
         state.log.push(Level::Warning, text, None, Some(hint.into()));

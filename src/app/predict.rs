@@ -34,8 +34,14 @@ pub enum PredictCommand {
 
 pub(super) fn step(state: &mut State, command: PredictCommand, effects: &mut Vec<Effect>) {
     match command {
-        PredictCommand::Generate => generate(state, false, effects),
-        PredictCommand::GenerateNewSeed => generate(state, true, effects),
+        PredictCommand::Generate => same_seed(state, effects),
+        PredictCommand::GenerateNewSeed => {
+            if results::can_generate(state).is_ok() {
+                state.settings.generate.seed = next_seed(state.settings.generate.seed);
+                settings::save(state, effects);
+            }
+            same_seed(state, effects);
+        }
         PredictCommand::Refit => refit(state, effects),
         PredictCommand::Choose(recipe) => {
             if state.results.predictions.contains(&recipe) {
@@ -46,17 +52,6 @@ pub(super) fn step(state: &mut State, command: PredictCommand, effects: &mut Vec
 }
 
 /// Starts the predictions of the fingers that are looked at, in one go; one that exists is shown instead.
-fn generate(state: &mut State, new_seed: bool, effects: &mut Vec<Effect>) {
-    if let Err(absent) = results::can_generate(state) {
-        return state.log.error(&refusal(absent));
-    }
-    if new_seed {
-        state.settings.generate.seed = next_seed(state.settings.generate.seed);
-        settings::save(state, effects);
-    }
-    same_seed(state, effects);
-}
-
 /// Starts the predictions with the seed as it is.
 pub(super) fn same_seed(state: &mut State, effects: &mut Vec<Effect>) {
     if let Err(absent) = results::can_generate(state) {

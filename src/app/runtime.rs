@@ -25,7 +25,7 @@ use super::state::results::Request;
 use super::state::tasks::Ticket;
 use super::state::view::UiRequest;
 use super::{demand, labels, results};
-use touch2touch_pipeline::io::catch_panic::catch_panic;
+use touch2touch_pipeline::io::catch_panic::{catch_panic, lock};
 use touch2touch_pipeline::job::{Cancel, Progress};
 
 /// The latest picture on the way of each touch, with the job that made it.
@@ -113,10 +113,8 @@ impl Runtime {
     pub fn start(&mut self, state: &mut State, place: Option<Place>) -> Vec<UiRequest> {
         let (settings, problem) = self.services.load_settings();
         let place = place.or_else(|| settings.recent.first().cloned()).unwrap_or(Place::Demo);
-        self.tick(
-            state,
-            vec![Answer::SettingsLoaded(Box::new(settings), problem).into(), LibraryCommand::Open(place).into()],
-        )
+        let loaded = Answer::SettingsLoaded(Box::new(settings), problem);
+        self.tick(state, vec![loaded.into(), LibraryCommand::Open(place).into()])
     }
 
     /// One round: answers of jobs, then `commands`, then what has to be done about them, then what is to be shown.
@@ -247,9 +245,4 @@ impl Drop for Runtime {
         self.follow(None);
         self.workers.close();
     }
-}
-
-/// A lock that a caught panic did not make unusable.
-fn lock<T>(mutex: &std::sync::Mutex<T>) -> std::sync::MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
 }

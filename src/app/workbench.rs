@@ -153,9 +153,8 @@ fn start_icp(state: &mut State, effects: &mut Vec<Effect>) {
         return state.log.error(&TaskError::new(WHAT, "no tool to move"));
     };
     let Ok(Some(pose)) = results::pose_key(state, hand.source) else {
-        return state
-            .log
-            .error(&TaskError::new(WHAT, "the contact points are still being computed").with_hint("Try again."));
+        let err = TaskError::new(WHAT, "the contact points are still being computed");
+        return state.log.error(&err.with_hint("Try again."));
     };
     let (source, start) = (hand.source, hand.pose);
     let key = RunKey { pose, start: Some(start.into()) };

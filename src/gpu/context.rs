@@ -1,7 +1,7 @@
 //! The graphics device, and its errors as values.
 
+use futures_lite::future::block_on;
 use std::sync::Arc;
-use std::task::{Context, Poll, Waker};
 
 use super::{GpuError, wgpu};
 
@@ -200,16 +200,4 @@ pub(super) fn begin_color<'e>(
     let color = wgpu::RenderPassColorAttachment { view, depth_slice: None, resolve_target: None, ops };
     let (label, color_attachments) = (Some(label), &[Some(color)][..]);
     encoder.begin_render_pass(&wgpu::RenderPassDescriptor { label, color_attachments, ..Default::default() })
-}
-
-/// Waits for a future. The futures of the native back ends are ready at once; this is all the executor they need.
-pub(super) fn block_on<F: Future>(future: F) -> F::Output {
-    let mut future = std::pin::pin!(future);
-    let mut context = Context::from_waker(Waker::noop());
-    loop {
-        match future.as_mut().poll(&mut context) {
-            Poll::Ready(value) => return value,
-            Poll::Pending => std::thread::yield_now(),
-        }
-    }
 }

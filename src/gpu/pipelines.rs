@@ -110,9 +110,9 @@ impl Pipelines {
             let view_layout = layout("Pipelines::view_layout", &[uniform]);
             let plain_layout = layout("Pipelines::plain_layout", &[uniform]);
             let pulled_layout = layout("Pipelines::pulled_layout", &[uniform, storage]);
-            let depth_layout = layout("Pipelines::depth_layout", &[depth_texture(gpu.samples > 1)]);
-            let picture_layout = layout("Pipelines::picture_layout", &[depth_texture(false)]);
-            let floor_layout = layout("Pipelines::floor_layout", &[uniform, filtered_texture(1), sampler(2)]);
+            let depth_layout = layout("Pipelines::depth_layout", &[texture(0, false, gpu.samples > 1)]);
+            let picture_layout = layout("Pipelines::picture_layout", &[texture(0, false, false)]);
+            let floor_layout = layout("Pipelines::floor_layout", &[uniform, texture(1, true, false), sampler(2)]);
             let thrown = |label, item_layout, vertices, stages| {
                 let (module, layouts) = (&shadow, &[&view_layout, item_layout][..]);
                 let (target, depth, samples) = (SHADOW_FORMAT.into(), None, 1);
@@ -182,17 +182,9 @@ fn binding(binding: u32, ty: wgpu::BufferBindingType) -> wgpu::BindGroupLayoutEn
     }
 }
 
-/// The depth of a target, for the fragment stage. Not as depth: GL cannot load single pixels of that.
-fn depth_texture(multisampled: bool) -> wgpu::BindGroupLayoutEntry {
-    texture(0, false, multisampled)
-}
-
-/// A picture that is read between its pixels, for the fragment stage.
-pub(super) fn filtered_texture(binding: u32) -> wgpu::BindGroupLayoutEntry {
-    texture(binding, true, false)
-}
-
-fn texture(binding: u32, filterable: bool, multisampled: bool) -> wgpu::BindGroupLayoutEntry {
+/// A picture for the fragment stage; `filterable` where it is read between its pixels. The depth of a target is one, too:
+/// GL cannot load single pixels of depth.
+pub(super) fn texture(binding: u32, filterable: bool, multisampled: bool) -> wgpu::BindGroupLayoutEntry {
     let sample_type = wgpu::TextureSampleType::Float { filterable };
     let view_dimension = wgpu::TextureViewDimension::D2;
     let ty = wgpu::BindingType::Texture { sample_type, view_dimension, multisampled };

@@ -9,7 +9,7 @@ use bytemuck::{Pod, Zeroable};
 
 use super::buffer::Elements;
 use super::context::begin_color;
-use super::pipelines::{PipelineParts, filtered_texture, sampler};
+use super::pipelines::{PipelineParts, sampler, texture};
 use super::{Gpu, GpuError, shaders, wgpu};
 
 /// A corner of a triangle.
@@ -67,7 +67,8 @@ struct Texture {
 /// A picture of the window's size, and how it is put on the window.
 #[derive(Clone, Debug)]
 pub struct FramePicture {
-    size: [u32; 2],
+    /// Width and height, pixels.
+    pub size: [u32; 2],
     view: wgpu::TextureView,
     bindings: wgpu::BindGroup,
     pipeline: wgpu::RenderPipeline,
@@ -98,7 +99,7 @@ impl Raster {
     pub fn new(gpu: &Gpu, format: wgpu::TextureFormat) -> Result<Self, GpuError> {
         let module = shaders::compile(gpu, "raster", shaders::RASTER)?;
         gpu.guarded("building the pipelines of the window", || {
-            let layout = gpu.layout("Raster::layout", &[filtered_texture(0), sampler(1)]);
+            let layout = gpu.layout("Raster::layout", &[texture(0, true, false), sampler(1)]);
             let corners = [Some(wgpu::VertexBufferLayout {
                 array_stride: size_of::<Corner>() as u64,
                 step_mode: wgpu::VertexStepMode::Vertex,
@@ -145,8 +146,8 @@ impl Raster {
     /// An empty picture of `size` pixels and `format`, which must be that of the raster.
     pub fn picture(&self, gpu: &Gpu, size: [u32; 2], format: wgpu::TextureFormat) -> FramePicture {
         let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING;
-        let view =
-            texture(gpu, "Raster::picture", size, format, usage).create_view(&wgpu::TextureViewDescriptor::default());
+        let texture = gpu.texture("Raster::picture", size.map(|s| s.max(1)), format, 1, usage);
+        let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
         let bindings = self.bind(gpu, &view, true);
         FramePicture { size, view, bindings, pipeline: self.whole.clone() }
     }
@@ -154,7 +155,8 @@ impl Raster {
     /// Makes or replaces a texture of `size` pixels, row by row; `rgba` premultiplied.
     pub fn set(&mut self, gpu: &Gpu, key: u64, size: [u32; 2], rgba: &[u8], nearest: bool) {
         let usage = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST;
-        let own = texture(gpu, "Raster::texture", size, wgpu::TextureFormat::Rgba8Unorm, usage);
+        let format = wgpu::TextureFormat::Rgba8Unorm;
+        let own = gpu.texture("Raster::texture", size.map(|s| s.max(1)), format, 1, usage);
         write(gpu, &own, [0; 2], size, rgba);
         let bindings = self.bind(gpu, &own.create_view(&wgpu::TextureViewDescriptor::default()), nearest);
         self.textures.insert(key, Texture { own: Some(own), bindings });
@@ -225,16 +227,6 @@ impl Raster {
 }
 
 /// A texture of at least one pixel.
-fn texture(
-    gpu: &Gpu,
-    label: &str,
-    size: [u32; 2],
-    format: wgpu::TextureFormat,
-    usage: wgpu::TextureUsages,
-) -> wgpu::Texture {
-    gpu.texture(label, size.map(|s| s.max(1)), format, 1, usage)
-}
-
 fn write(gpu: &Gpu, texture: &wgpu::Texture, [x, y]: [u32; 2], [width, height]: [u32; 2], rgba: &[u8]) {
     let origin = wgpu::Origin3d { x, y, z: 0 };
     gpu.queue.write_texture(

@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use glam::{DVec3, Vec4};
+use glam::Vec4;
 
 use super::buffer::Uniform;
 use super::floor::{Caster, Floor, FloorData};
@@ -40,23 +40,6 @@ with_defaults! {
         pub eye_dome: bool = false,
         /// The camera is being moved: only so many points are drawn as [`SceneRenderer::moving_points`] allows.
         pub moving: bool = false,
-    }
-}
-
-impl SceneData {
-    /// The box around all finite points and meshes in the world; `None` if there are none.
-    /// Walks all geometry: call it when a person asks, not at every frame.
-    pub fn bounds(&self) -> Option<[DVec3; 2]> {
-        let points =
-            self.clouds.iter().flat_map(|c| c.points.iter().map(|p| c.style.world_from_points.transform_point3(*p)));
-        let corners = self
-            .meshes
-            .iter()
-            .flat_map(|m| m.mesh.vertices.iter().map(|p| m.style.world_from_mesh.transform_point3(*p)));
-        points.chain(corners).filter(|p| p.is_finite()).fold(None, |bounds, p| {
-            let [lo, hi] = bounds.unwrap_or([p, p]);
-            Some([lo.min(p), hi.max(p)])
-        })
     }
 }
 
@@ -286,7 +269,7 @@ impl SceneRenderer {
         self.counters.uploads += done.uploads;
         self.counters.uniforms += done.uniforms;
         if scene.eye_dome && self.depth.as_ref().is_none_or(|(of, _)| *of != target.generation()) {
-            let depth = [wgpu::BindingResource::TextureView(target.depth_alone())];
+            let depth = [wgpu::BindingResource::TextureView(&target.depth_alone)];
             let depth = gpu.bind("Edl::depth", &self.pipelines.depth_layout, &depth);
             self.depth = Some((target.generation(), depth));
         }

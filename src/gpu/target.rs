@@ -14,8 +14,8 @@ pub struct Target {
     resolved_view: wgpu::TextureView,
     multisampled: Option<wgpu::TextureView>,
     depth: wgpu::TextureView,
-    /// The depth without the stencil, for shaders.
-    depth_alone: wgpu::TextureView,
+    /// The depth of every sample, without the stencil, for shaders.
+    pub(super) depth_alone: wgpu::TextureView,
 }
 
 impl Target {
@@ -72,11 +72,6 @@ impl Target {
         &self.resolved_view
     }
 
-    /// The depth of every sample, for shaders.
-    pub(super) fn depth_alone(&self) -> &wgpu::TextureView {
-        &self.depth_alone
-    }
-
     /// Starts a pass.
     pub(super) fn begin<'e>(&self, encoder: &'e mut wgpu::CommandEncoder, pass: Pass) -> wgpu::RenderPass<'e> {
         let (view, resolve_target, store_color) = match &self.multisampled {
@@ -128,7 +123,7 @@ impl Target {
             encoder.copy_texture_to_buffer(
                 self.resolved.as_image_copy(),
                 wgpu::TexelCopyBufferInfo { buffer: &buffer, layout },
-                extent(self.size),
+                wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
             );
             gpu.queue.submit([encoder.finish()]);
             Ok(buffer)
@@ -184,9 +179,4 @@ impl Picture {
         let start = (y as usize * width as usize + x as usize) * 4;
         (x < width && y < height).then(|| [self.rgba[start], self.rgba[start + 1], self.rgba[start + 2]])
     }
-}
-
-/// `size` for the device.
-fn extent([width, height]: [u32; 2]) -> wgpu::Extent3d {
-    wgpu::Extent3d { width, height, depth_or_array_layers: 1 }
 }

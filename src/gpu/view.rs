@@ -234,13 +234,11 @@ impl Camera {
     pub(super) fn uniform(&self, part: Part, unit_px: f32) -> ViewUniform {
         let size = part.of;
         let [_, up, back] = self.axes();
-        let eye = if self.orthographic { back.extend(0.0) } else { self.eye().extend(1.0) };
-        let at_one = if self.orthographic { 1.0 } else { self.distance };
-        let depth = if self.orthographic {
+        let (eye, at_one, depth) = if self.orthographic {
             let reach = ORTHOGRAPHIC_REACH * self.distance;
-            [self.distance + reach, 2.0 * reach, 1.0, self.distance]
+            (back.extend(0.0), 1.0, [self.distance + reach, 2.0 * reach, 1.0, self.distance])
         } else {
-            [NEAR * self.distance, 0.0, 0.0, self.distance]
+            (self.eye().extend(1.0), self.distance, [NEAR * self.distance, 0.0, 0.0, self.distance])
         };
         ViewUniform {
             clip_from_world: (part.clip_from_whole() * self.clip_from_world(size)).as_mat4().to_cols_array(),

@@ -83,18 +83,10 @@ pub(super) fn run(args: &AdaptArgs) -> VerbResult {
     };
     let adapted = adapt(&dataset, &setup, &models, &output.job())?;
     super::notes::say_found(&dataset, &adapted.notes);
-    for remark in &adapted.left_out {
-        output.note(&format!("not used: {}: {}", remark.name, remark.why));
-    }
-    for remark in &adapted.doubtful {
-        output.note(&format!("look at {}: {}", remark.name, remark.why));
-    }
-    for warning in &adapted.warnings {
-        output.note(&format!("note: {warning}"));
-    }
-    for objection in &adapted.objections {
-        output.note(&format!("against this fit: {objection}"));
-    }
+    output.notes("not used: ", &adapted.left_out);
+    output.notes("look at ", &adapted.doubtful);
+    output.notes("note: ", &adapted.warnings);
+    output.notes("against this fit: ", &adapted.objections);
     let complete = adapted.left_out.is_empty() && adapted.unwritten.is_none();
     let report = Report {
         adapted,

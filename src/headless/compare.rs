@@ -125,10 +125,7 @@ pub(super) fn run(args: &CompareArgs) -> VerbResult {
     let sample = dataset.load(id)?;
     let mut notes = Notes::of(&dataset);
     notes.take(&output, &sample.notes);
-    let tool = match &entry.tool {
-        Some(name) => Some(load_tool(&dataset, name)?),
-        None => None,
-    };
+    let tool = entry.tool.as_ref().map(|name| load_tool(&dataset, name)).transpose()?;
     notes.take(&output, tool.as_ref().map_or(&[], |loaded| &loaded.notes));
     let lacks = TaskError::new("Compare", "no tool is named, so there is no CAD model");
     let labels = labels_of(&Labels::of(&dataset), &entry.name, &output);

@@ -31,7 +31,7 @@ use touch2touch_pipeline::steps::imprint::{self, imprint_of};
 use touch2touch_pipeline::steps::on_pad::OnPad;
 use touch2touch_pipeline::steps::prediction::Prediction;
 
-use report::{COLOR_CONVENTION, Figures, Pair, Report, Stored, Unit, convention, mean, text};
+use report::{COLOR_CONVENTION, Figures, Pair, Report, Stored, convention, mean, text};
 
 /// Arguments of `generate`.
 #[derive(Debug, Args)]
@@ -66,7 +66,7 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
     notes.take(&output, &doubts::notes(&dataset));
     let mut complete = !ids.is_empty();
     let mut scale = Scale::Measured;
-    let mut unit = Unit::Meters;
+    let mut in_color = false;
     for (id, stem) in ids.into_iter().zip(stems) {
         let id = PairId(id as u32);
         let name = dataset.index.pairs[id.0 as usize].name.clone();
@@ -84,11 +84,8 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
             for finger in fingers {
                 let Some(touch) = sample.pad(finger) else { continue };
                 let picture = generating.picture(&sample, finger)?;
-                touches.push((
-                    finger,
-                    touch,
-                    picture.ok_or_else(|| anyhow::anyhow!("{}", generating.no_input(&sample.rig).why))?,
-                ));
+                let picture = picture.ok_or_else(|| anyhow::anyhow!("{}", generating.no_input(&sample.rig).why))?;
+                touches.push((finger, touch, picture));
             }
             let pictures: Vec<_> = touches.iter().map(|(_, _, picture)| picture.clone()).collect();
             let predictions = generating.of(&models, &pictures, &JobCx::unwatched())?;
@@ -99,7 +96,7 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
                 let (seconds, kept) = (predicted.seconds, predicted.kept);
                 let mut pair = Pair { name: name.clone(), finger: key, seconds, kept, ..Pair::default() };
                 if let Some(difference) = imprint::color(&predicted, [0, 0])? {
-                    unit = Unit::Levels;
+                    in_color = true;
                     write_color(&stem, &difference)?;
                     score_color(&difference, touch, &mut pair.figures)?;
                     made.push(pair);
@@ -126,7 +123,7 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
     }
     let report = Report {
         mean: mean(&pairs),
-        convention: (if unit == Unit::Levels { COLOR_CONVENTION } else { convention(scale) }).into(),
+        convention: (if in_color { COLOR_CONVENTION } else { convention(scale) }).into(),
         bundle: generating.bundle.name.clone(),
         runtime: args.model.engine_label()?.into(),
         sampler: config.sampler.key().into(),

@@ -86,13 +86,7 @@ struct Exported {
     left_out: BTreeMap<LeftOut, usize>,
     /// Of what was written; missing in a dry run.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
-    written: Option<Written>,
-}
-
-#[derive(Serialize)]
-struct Written {
-    out_of_range_px: usize,
-    unmeasured_px: usize,
+    written: Option<ExportReport>,
 }
 
 pub(super) fn run(verb: &MasksVerb) -> VerbResult {
@@ -128,8 +122,7 @@ pub(super) fn run(verb: &MasksVerb) -> VerbResult {
         let note = |note: &str| output.note(note);
         let automatic = automatic_too.then(|| Automatic::new(&dataset, &recipe, &models, &note));
         let (plan, report) = export_masks(&dataset, &masks, &setup, &args.out, automatic, &output.job())?;
-        let ExportReport { out_of_range_px, unmeasured_px, .. } = report;
-        (plan, Some(Written { out_of_range_px, unmeasured_px }))
+        (plan, Some(report))
     };
     let [train, val, test] = plan.counts;
     let exported = Exported {

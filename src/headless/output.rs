@@ -2,6 +2,7 @@
 //!
 //! A reader that has seen enough (`| head`) ends the program quietly; a disk that is full is an error. Neither is a panic.
 
+use std::fmt::Display;
 use std::io::{self, IsTerminal as _, Write as _};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -103,6 +104,11 @@ impl Output {
     /// A line on standard error.
     pub fn note(&self, text: &str) {
         note(text);
+    }
+
+    /// A line on standard error for each of them, which begins with `start`.
+    pub fn notes(&self, start: &str, all: impl IntoIterator<Item: Display>) {
+        all.into_iter().for_each(|one| self.note(&format!("{start}{one}")));
     }
 
     /// True where standard output is for programs.

@@ -13,7 +13,6 @@ use super::output::says;
 use super::recipe::misgiving;
 use touch2touch_core::align::{AlignReport, Ask};
 use touch2touch_core::dataset::PairId;
-use touch2touch_core::manual::AcceptedPose;
 use touch2touch_core::pose::{Registration, ToolModel};
 use touch2touch_core::which_tool::in_words;
 use touch2touch_pipeline::doubts;
@@ -52,9 +51,9 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
     let mut complete = true;
     let open = TaskError::new("Pose", "the tool is not known yet");
     for id in ids {
-        let entry = &dataset.index.pairs[id];
+        let (pair, entry) = (PairId(id as u32), &dataset.index.pairs[id]);
         output.step(&entry.name);
-        let sample = match dataset.load(PairId(id as u32)) {
+        let sample = match dataset.load(pair) {
             Ok(sample) => sample,
             Err(err) => {
                 output.note(&format!("{}: {err}", entry.name));
@@ -96,16 +95,9 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
             if imprint == ImprintSource::Predicted {
                 notes.take(&output, misgiving(&recipe, &sample).as_slice());
             }
-            let pair = PairId(id as u32);
-            let asked = PairInput {
-                name: &entry.name,
-                touch: Touch { dataset: &dataset, pair, sample: &sample, tool, labels: &labels },
-                tried: &tried,
-                recipe: &recipe,
-                accepted: labels.accepted(&recipe.imprint_of()),
-            };
-            let work = || pose_cases(args, &asked, &models);
-            match guarded(dataset.pair_files(PairId(id as u32)), work) {
+            let touch = Touch { dataset: &dataset, pair, sample: &sample, tool, labels: &labels };
+            let work = || pose_cases(args, &entry.name, touch, &tried, &recipe, &models);
+            match guarded(dataset.pair_files(pair), work) {
                 Ok(found) => {
                     for note in found.first().iter().flat_map(|case| &case.mask_notes) {
                         output.note(&format!("note: {} ({} imprint), {note}", entry.name, imprint.key()));
@@ -132,21 +124,17 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
     Ok(complete)
 }
 
-/// A pair as `pose` asks for it.
-struct PairInput<'a> {
-    name: &'a str,
-    /// Of which the tool is left open where all are to be tried.
-    touch: Touch<'a>,
-    /// Tools by name.
-    tried: &'a [(&'a str, &'a ToolModel)],
-    recipe: &'a Recipe,
-    accepted: Option<AcceptedPose>,
-}
-
-/// One case per engine for one pair and one kind of imprint.
-fn pose_cases(args: &PoseArgs, asked: &PairInput<'_>, models: &Models) -> anyhow::Result<Vec<PoseRow>> {
-    let PairInput { name, touch, tried, recipe, accepted } = *asked;
-    let (sample, imprint) = (touch.sample, recipe.imprint);
+/// One case per engine for the pair `name` and one kind of imprint. The tool of `touch` is left open where all of `tried`,
+/// by name, are to be tried.
+fn pose_cases(
+    args: &PoseArgs,
+    name: &str,
+    touch: Touch<'_>,
+    tried: &[(&str, &ToolModel)],
+    recipe: &Recipe,
+    models: &Models,
+) -> anyhow::Result<Vec<PoseRow>> {
+    let (sample, imprint, accepted) = (touch.sample, recipe.imprint, touch.labels.accepted(&recipe.imprint_of()));
     let estimate = estimate(touch, recipe, Stage::Cloud, models, &JobCx::unwatched())?;
     let contact = estimate.contact();
     let truth = sample.grasp_from_object;

@@ -127,10 +127,9 @@ pub(super) fn misgiving(recipe: &Recipe, sample: &Sample) -> Option<Problem> {
 
 /// Loads the models that a touch needs and runs them once; see [`Models::warm_up`].
 pub(super) fn warm_up(recipe: &Recipe, models: &Models) -> Result<(), TaskError> {
-    let generating = recipe.generating()?;
-    let made = models.warm_up(generating.bundle, generating.engine, generating.config)?;
+    let made = models.warm_up(recipe.generating()?)?;
     if let Some(model) = &recipe.mask_model {
-        models.mask(model, recipe.engine, &imprint::imprint(&made, recipe.shift, [0, 0])?, None)?;
+        models.mask(model, recipe.engine, &imprint::imprint(&made, recipe.shift, [0, 0])?)?;
     }
     Ok(())
 }

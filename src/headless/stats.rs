@@ -60,9 +60,7 @@ pub(super) fn run(args: &StatsArgs) -> VerbResult {
     let fingers = pads_named(&dataset.rig, &args.finger).map_err(anyhow::Error::msg)?;
     let setup = StatisticsSetup { pairs: ids, fingers, recipe: recipe.clone(), dataset: dataset.title.clone() };
     let (statistics, failed) = statistics(&setup, load, &models, &output.job())?;
-    for failure in &failed {
-        output.note(&failure.to_string());
-    }
+    output.notes("", &failed);
     statistics.write(&args.out)?;
     let [gain, offset_m] = statistics.stats.affine(chain.range.max_m);
     let failed: Vec<String> = failed.iter().map(ToString::to_string).collect();

@@ -185,12 +185,8 @@ impl Watch {
 
 fn report(output: &Output, done: &Done, summary: &mut Summary) -> anyhow::Result<()> {
     if done.fresh { &mut summary.fresh } else { &mut summary.backlog }.push(done.latency);
-    for note in &done.notes {
-        output.note(&super::notes::line(note));
-    }
-    for note in &done.mask_notes {
-        output.note(&format!("note: {}, {note}", done.name));
-    }
+    output.notes("", done.notes.iter().map(super::notes::line));
+    output.notes(&format!("note: {}, ", done.name), &done.mask_notes);
     let mut event = serde_json::to_value(done)?;
     event["event"] = "done".into();
     output.line(&event, || done.text())

@@ -3,6 +3,7 @@
 use glam::DVec3;
 use touch2touch_core::dataset::{PairId, Split};
 use touch2touch_core::rig::lab;
+use touch2touch_pipeline::compare;
 use touch2touch_pipeline::io::dataset::{Dataset, SourceKind};
 
 use crate::support;
@@ -117,7 +118,7 @@ fn the_real_pictures_open_without_a_problem() {
         let laid = loaded.sample.laid;
         assert_eq!(dataset.bubble_tile(PairId(i), laid).unwrap().unwrap().size(), [128, 128]);
         assert_eq!(dataset.vqvae_tile(PairId(i), laid).unwrap().unwrap().size(), [128, 128]);
-        assert_eq!(dataset.vqvae_imprint(PairId(i), laid).unwrap().unwrap().size(), [175, 140]);
+        assert_eq!(compare::beside(&dataset, PairId(i), &loaded.sample).unwrap().unwrap().imprint.size(), [175, 140]);
         let difference = &touch.color().unwrap().difference;
         for (c, sum) in squares.iter_mut().enumerate() {
             let mean_square: f64 =

@@ -126,7 +126,7 @@ pub(super) fn masks(set: &CaseSet, kind: Masks, args: &ModelArgs) -> anyhow::Res
                 *mask = imprint.map(|pushed| pushed.is_finite() && *pushed >= mm / 1e3);
             }
             if let Some(model) = &model {
-                *mask = (*models.mask(model, EngineChoice::default(), imprint, None)?.mask).clone();
+                *mask = (*models.mask(model, EngineChoice::default(), imprint)?.mask).clone();
             }
         }
         Ok(masks)

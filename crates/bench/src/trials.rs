@@ -260,7 +260,9 @@ impl Hand<'_> {
                 let grasp = grasp(found.grasp_from_object);
                 // Where a tool is along its own axis is no fault: it is let down along it until it meets something.
                 let (pose, evidence) = (found.grasp_from_object, found.report.evidence.as_ref());
-                let across_m = evidence.map(|e| e.uncertainty.along_m(pose, DVec2::from_angle(pose.theta_rad)));
+                let turn = DVec2::from_angle(pose.theta_rad);
+                let across = |axes: [DVec2; 2]| DVec2::from(axes.map(|axis| axis.dot(turn))).length();
+                let across_m = evidence.map(|e| across(e.uncertainty.half_axes(pose)));
                 let is_known = across_m.is_some_and(|across_m| across_m <= PLACE_OPEN_M);
                 let counts = |sign: &&Sign| !(is_known && sign.kind == SignKind::PlaceOpen);
                 let worst = |verdict: &Verdict| verdict.against.iter().filter(counts).map(|sign| sign.grade).max();

@@ -37,7 +37,7 @@ use super::frames::PlanarPose;
 use super::units::angle_error;
 
 pub use joint::{Basis, Elsewhere, Evidence, JointConfig, JointFit, MembraneEvidence, PoseAnswer};
-pub use lab_icp::{LabIcpConfig, LabModel, lab_icp};
+pub use lab_icp::{LabIcp, LabModel, lab_icp};
 pub(crate) use observability::DEGENERATE_BELOW;
 pub use observability::{Observability, observability};
 pub use planar::align;

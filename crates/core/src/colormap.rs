@@ -65,7 +65,7 @@ impl ColorMap {
 
     /// [`Self::rgb`] in bytes, rounded to nearest.
     pub fn rgb8(self, unit: f32) -> [u8; 3] {
-        self.rgb(unit).map(to_u8)
+        self.rgb(unit).map(|v| (v * 255.0 + 0.5) as u8)
     }
 
     /// The map sampled at 256 equally spaced positions, for images.
@@ -124,11 +124,6 @@ impl Range {
         let first = (self.lo / step).ceil() as i64;
         (0..=most as i64 + 1).map(|i| (first + i) as f32 * step).take_while(|v| *v <= self.hi + step * 1e-3).collect()
     }
-}
-
-/// 0..1 to 0..255, rounded to nearest.
-fn to_u8(v: f32) -> u8 {
-    (v * 255.0 + 0.5) as u8
 }
 
 #[cfg(test)]

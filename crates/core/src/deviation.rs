@@ -54,11 +54,7 @@ pub struct Painted {
 pub fn on_surface(mesh: &TriMesh, points: &[DVec3], reach_m: f64) -> Painted {
     let tree = Nearest::new(points);
     let nearest = |p: DVec3| tree.of(p);
-    let triangles: Vec<[DVec3; 3]> = (0..mesh.triangles.len())
-        .filter(|&i| mesh.triangles[i].iter().all(|&v| (v as usize) < mesh.vertices.len()))
-        .map(|i| mesh.corners(i))
-        .filter(|corners| corners.iter().all(|p| p.is_finite()))
-        .collect();
+    let triangles = mesh.sound_triangles();
     let parts: Vec<Vec<([DVec3; 3], [f32; 3])>> = triangles
         .par_iter()
         .map(|&corners| {

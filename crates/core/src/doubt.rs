@@ -26,7 +26,6 @@ use super::frames::PlanarPose;
 use super::mesh::TriMesh;
 use super::moments::median;
 use super::read_as::ReadAs;
-use super::rig::PerPad;
 use super::sample::{PadTouch, Reading, Sample};
 
 pub use imprints::Axes;
@@ -157,10 +156,8 @@ pub type Predict<'a> = &'a mut dyn FnMut(&[&Sample]) -> Option<Vec<Placed>>;
 /// A doubt of the imprints is taken for true before the images are looked at, and so on.
 pub fn judge(pairs: &[PairInput<'_>], tools: &BTreeMap<String, TriMesh>, predict: Option<Predict<'_>>) -> Vec<Doubt> {
     let mut doubts = Vec::new();
-    let depths: Vec<Sample> = pairs.iter().map(|pair| only(pair.sample, false)).collect();
-    let depths: Vec<PairInput<'_>> =
-        pairs.iter().zip(&depths).map(|(pair, sample)| PairInput { sample, ..*pair }).collect();
-    doubts.extend(of_imprints(&depths, tools));
+    let depths: Vec<Sample> = pairs.iter().map(|pair| without_color(pair.sample)).collect();
+    doubts.extend(of_imprints(&with_samples(pairs, &depths), tools));
     let images = images::judge(pairs);
     let sound = images.is_none();
     doubts.extend(images);
@@ -204,9 +201,7 @@ fn of_all_imprints(
         // No mirror image and no factor of the imprints looks like this.
         return Some(registered.doubt(mismatch));
     }
-    let samples: Vec<&Sample> = pairs.iter().map(|pair| pair.sample).collect();
-    let named: Vec<Option<&str>> = pairs.iter().map(|pair| pair.tool).collect();
-    let by_imprints = imprints::judge(&samples, &named, tools, !registered.agree());
+    let by_imprints = imprints::judge(pairs, tools, !registered.agree());
     if let Some((mismatch, likeness)) = mismatch {
         // An explanation is better than none, and of two the likelier.
         let margin = if mismatch == Mismatch::Unknown { -SAME } else { SAME };
@@ -218,10 +213,8 @@ fn of_all_imprints(
     // A cure is tried to the end before it is offered.
     let cured = match &doubt.cause {
         Cause::Stored(read_as) => {
-            let read: Vec<Sample> = samples.iter().map(|sample| ReadAs::all(&[*read_as], sample)).collect();
-            let read: Vec<PairInput<'_>> =
-                pairs.iter().zip(&read).map(|(pair, sample)| PairInput { sample, ..*pair }).collect();
-            registered.is_cured_by(&poses::Registered::of(&read, models))
+            let read: Vec<Sample> = pairs.iter().map(|pair| ReadAs::all(&[*read_as], pair.sample)).collect();
+            registered.is_cured_by(&poses::Registered::of(&with_samples(pairs, &read), models))
         }
         Cause::Axes(tools_of, axes) => {
             let turned = tools_of.iter().filter_map(|name| Some((name.clone(), axes.apply(tools.get(name)?))));
@@ -238,34 +231,26 @@ fn of_all_imprints(
     if cured { Some(doubt) } else { registered.unexplained() }
 }
 
-/// A sample with the readings of one kind of sensor alone: what is tried on it need not copy the other's pictures.
-fn only(sample: &Sample, color: bool) -> Sample {
-    let pads: PerPad<PadTouch> = sample
-        .pads
-        .iter()
-        .map(|touch| {
-            let touch = touch.as_ref()?;
-            let mut kept = PadTouch::default();
-            kept.lent.clone_from(&touch.lent);
-            for (sensor, reading) in touch.readings() {
-                if matches!(reading, Reading::Color(_)) == color {
-                    kept.set(*sensor, reading.clone());
-                }
+/// A sample without its color images: what is tried on it need not copy them.
+fn without_color(sample: &Sample) -> Sample {
+    let depths = |touch: &Option<PadTouch>| {
+        let touch = touch.as_ref()?;
+        let mut kept = PadTouch::default();
+        kept.lent.clone_from(&touch.lent);
+        for (sensor, reading) in touch.readings() {
+            if let Reading::Depth(depth) = reading {
+                kept.set(*sensor, depth.clone());
             }
-            Some(kept)
-        })
-        .collect();
-    let Sample { rig, grasp_from_object, scale, laid, reading, taken_by, .. } = sample;
-    Sample {
-        rig: rig.clone(),
-        pads,
-        grasp_from_object: *grasp_from_object,
-        scale: *scale,
-        laid: *laid,
-        reading: *reading,
-        taken_by: *taken_by,
-        notes: Vec::new(),
-    }
+        }
+        Some(kept)
+    };
+    let pads = sample.pads.iter().map(depths).collect();
+    Sample { rig: sample.rig.clone(), pads, notes: Vec::new(), ..*sample }
+}
+
+/// The pairs with other samples, in order.
+fn with_samples<'a>(pairs: &[PairInput<'a>], samples: &'a [Sample]) -> Vec<PairInput<'a>> {
+    pairs.iter().zip(samples).map(|(pair, sample)| PairInput { sample, ..*pair }).collect()
 }
 
 /// Gain of a reading: how much better pairs are under it than as they are stored.

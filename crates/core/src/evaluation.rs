@@ -12,7 +12,7 @@ mod metric;
 mod paper;
 mod write;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -217,10 +217,7 @@ pub fn row(scores: &Scores, groups: &[Group], resamples: usize) -> Row {
 
 /// The column groups of some grasps, in the order of the table.
 pub fn groups_of<'a>(grasps: impl IntoIterator<Item = &'a GraspScore>) -> Vec<Group> {
-    let mut groups: Vec<Group> = grasps.into_iter().map(|g| g.group).collect();
-    groups.sort_unstable();
-    groups.dedup();
-    groups
+    grasps.into_iter().map(|g| g.group).collect::<BTreeSet<_>>().into_iter().collect()
 }
 
 fn figures(group: Group, grasps: &[&GraspScore], measured: &[&[f32]], resamples: usize) -> TableMetrics {

@@ -4,7 +4,7 @@
 //! the stored distances are exact: to the nearest projected edge. Inside they are exact to about a tenth of a
 //! millimeter, which is enough because registration charges nothing there.
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
 use super::mesh::TriMesh;
 
@@ -73,17 +73,8 @@ impl DistanceField {
         if let Some(triangle) = mesh.triangles.iter().position(|t| t.iter().any(|&v| v as usize >= corners)) {
             return Err(FieldError::Index { triangle });
         }
-        let mut bounds: Option<[glam::DVec3; 2]> = None;
-        let mut triangles: Vec<[DVec2; 3]> = Vec::with_capacity(mesh.triangles.len());
-        for i in 0..mesh.triangles.len() {
-            let corners = mesh.corners(i);
-            if corners.iter().all(|c| c.is_finite()) {
-                for c in corners {
-                    bounds = Some(bounds.map_or([c, c], |[lo, hi]| [lo.min(c), hi.max(c)]));
-                }
-                triangles.push(corners.map(|c| DVec2::new(c.y, c.z)));
-            }
-        }
+        let triangles = mesh.sound_triangles();
+        let bounds = triangles.iter().flatten().map(|c| [*c, *c]).reduce(|[lo, hi], [c, _]| [lo.min(c), hi.max(c)]);
         let [low, high] = bounds.ok_or(FieldError::Empty)?;
         let size = (high - low).max_element();
         let scale = super::units::scale_to_meters(size);
@@ -170,9 +161,9 @@ struct Raster {
 }
 
 impl Raster {
-    fn signed_distance(&self, triangles: &[[DVec2; 3]]) -> Vec<f32> {
+    fn signed_distance(&self, triangles: &[[DVec3; 3]]) -> Vec<f32> {
         let triangles: Vec<[DVec2; 3]> =
-            triangles.iter().map(|t| t.map(|p| (p - self.origin) * (1.0 / CELL_M))).collect();
+            triangles.iter().map(|t| t.map(|p| (DVec2::new(p.y, p.z) - self.origin) * (1.0 / CELL_M))).collect();
         let inside = self.fill(&triangles);
 
         // Outside: the nearest edge of any triangle. Seeds next to the silhouette, then carried outwards.

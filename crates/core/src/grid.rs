@@ -111,6 +111,14 @@ impl<T> Grid<T> {
     }
 }
 
+impl RgbGrid {
+    /// Adds another picture of this size, value by value.
+    pub(crate) fn add(&mut self, other: &Self) {
+        let values = self.data.as_flattened_mut().iter_mut();
+        values.zip(other.data.as_flattened()).for_each(|(value, more)| *value += more);
+    }
+}
+
 impl<T: Clone> Grid<T> {
     /// An image filled with `value`.
     pub fn filled(width: usize, height: usize, value: T) -> Self {

@@ -1,26 +1,23 @@
 //! Looking into a registration: what a step compares.
 
+use std::sync::Arc;
+
 use glam::{DVec2, DVec3};
 
-use super::align::TraceStep;
-use super::align::correspond::{Matches, ModelPoints, Surface, correspondences};
+use super::align::correspond::{Matches, Surface, correspondences};
+use super::align::{LabModel, TraceStep};
 use super::pose::{Registration, ToolModel};
 
 /// Model that contact points are compared with at any step of a run, prepared once per tool.
 #[derive(Clone, Debug)]
 pub struct Counterparts {
-    model: Option<ModelPoints>,
+    model: Option<Arc<LabModel>>,
 }
 
 impl Counterparts {
     /// For a registration with a tool.
     pub fn new(tool: &ToolModel, engine: Registration) -> Self {
-        Self {
-            model: (!engine.uses_field()).then(|| {
-                let surface = tool.surface().iter().map(|(p, _)| *p);
-                ModelPoints::new(&in_plane(&surface.collect::<Vec<_>>()))
-            }),
-        }
+        Self { model: (engine == Registration::LabIcp).then(|| LabModel::of(tool)) }
     }
 
     /// The correspondences of a step, of at most `most` points. `tool` is that of [`Self::new`]. Some 10 µs for
@@ -30,12 +27,9 @@ impl Counterparts {
             Some(model) => Surface::Points(model),
             None => Surface::Silhouette(&tool.field),
         };
-        correspondences(&in_plane(points), surface, step.grasp_from_object, step.kernel_m, most)
+        let points: Vec<DVec2> = points.iter().map(|p| DVec2::new(p.y, p.z)).collect();
+        correspondences(&points, surface, step.grasp_from_object, step.kernel_m, most)
     }
-}
-
-fn in_plane(points: &[DVec3]) -> Vec<DVec2> {
-    points.iter().map(|p| DVec2::new(p.y, p.z)).collect()
 }
 
 #[cfg(test)]

@@ -32,11 +32,7 @@ const APART: f64 = 0.25;
 
 /// The markers' edges of a square, upright difference image: mean 0, deviation 1. `None` for a flat or broken picture.
 pub fn signature(difference: &RgbGrid) -> Option<Grid<f32>> {
-    if difference.is_empty() || difference.as_slice().iter().flatten().any(|v| !v.is_finite()) {
-        return None;
-    }
-    let gray =
-        resample::bilinear_rgb(difference, SIDE, SIDE).map(|p| p.iter().map(|&v| f64::from(v)).sum::<f64>() / 3.0);
+    let gray = gray(difference)?;
     let smooth = gaussian(&gray, SMOOTH_PX);
     let edges = Grid::from_fn(SIDE, SIDE, |x, y| (gray[(x, y)] - smooth[(x, y)]).abs());
     standardized(&gaussian(&edges, EDGE_PX))
@@ -45,11 +41,7 @@ pub fn signature(difference: &RgbGrid) -> Option<Grid<f32>> {
 /// The finger of the lab's rig whose GelSlim took an upright difference image, by the places of its markers: without contact
 /// they were there, which leaves bright dots in the difference. `None` where the dots are clearly neither's.
 pub fn lab_finger(difference: &RgbGrid) -> Option<PadId> {
-    if difference.is_empty() || difference.as_slice().iter().flatten().any(|v| !v.is_finite()) {
-        return None;
-    }
-    let gray =
-        resample::bilinear_rgb(difference, SIDE, SIDE).map(|p| p.iter().map(|&v| f64::from(v)).sum::<f64>() / 3.0);
+    let gray = gray(difference)?;
     let (fine, smooth) = (gaussian(&gray, DOT_PX), gaussian(&gray, AROUND_DOT_PX));
     let dots = Grid::from_fn(SIDE, SIDE, |x, y| fine[(x, y)] - smooth[(x, y)]);
     let mut sizes: Vec<f64> = dots.as_slice().iter().map(|v| v.abs()).collect();
@@ -66,6 +58,13 @@ pub fn lab_finger(difference: &RgbGrid) -> Option<PadId> {
     let [right, left] = lab::PADS.map(brightness);
     let (finger, own, other) = if right > left { (lab::RIGHT, right, left) } else { (lab::LEFT, left, right) };
     (own > BRIGHT && own - other > BRIGHT).then_some(finger)
+}
+
+/// The picture in gray and at the side that markers are looked at; `None` for one that is empty or not finite.
+fn gray(difference: &RgbGrid) -> Option<Grid<f64>> {
+    let sound = !difference.is_empty() && difference.as_slice().iter().flatten().all(|v| v.is_finite());
+    let gray = |pixel: &[f32; 3]| pixel.iter().map(|&v| f64::from(v)).sum::<f64>() / 3.0;
+    sound.then(|| resample::bilinear_rgb(difference, SIDE, SIDE).map(gray))
 }
 
 fn standardized(image: &Grid<f64>) -> Option<Grid<f32>> {

@@ -40,6 +40,12 @@ impl TriMesh {
         cut
     }
 
+    /// The corners of the triangles of which all are there and finite.
+    pub(crate) fn sound_triangles(&self) -> Vec<[DVec3; 3]> {
+        let corner = |at: &u32| self.vertices.get(*at as usize).copied().filter(|corner| corner.is_finite());
+        self.triangles.iter().filter_map(|[a, b, c]| Some([corner(a)?, corner(b)?, corner(c)?])).collect()
+    }
+
     /// The corners of triangle `index`.
     pub fn corners(&self, index: usize) -> [DVec3; 3] {
         self.triangles[index].map(|v| self.vertices[v as usize])

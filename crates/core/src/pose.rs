@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use strum::IntoEnumIterator as _;
 
 use super::align::{
-    AlignConfig, AlignError, AlignReport, Ask, Contacts, Evidence, JointConfig, LabIcpConfig, Range, Register, Scene,
+    AlignConfig, AlignError, AlignReport, Ask, Contacts, Evidence, JointConfig, LabIcp, Range, Register, Scene,
 };
 
 pub use super::tool::{ToolError, ToolModel};
@@ -135,13 +135,8 @@ impl Registration {
                 }
                 Box::new(config)
             }
-            Self::LabIcp => Box::new(LabIcpConfig::default()),
+            Self::LabIcp => Box::new(LabIcp),
         }
-    }
-
-    /// True where it compares with the silhouette's field rather than with model points.
-    pub fn uses_field(self) -> bool {
-        self != Self::LabIcp
     }
 }
 

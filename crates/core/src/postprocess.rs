@@ -16,7 +16,7 @@ mod flags;
 mod refit;
 mod stats;
 
-pub use color::{ColorChain, Picture};
+pub use color::ColorChain;
 pub use correction::{Correction, CorrectionPart, CorrectionParts, Response};
 pub use flags::{Flag, FlagKind, Severity, flags};
 pub use refit::{RefitShift, ShiftFit};
@@ -91,9 +91,6 @@ pub enum ShiftMode {
 }
 
 impl ShiftMode {
-    /// All modes that need no data set, in the order shown.
-    pub const ALL: [ShiftMode; 3] = [ShiftMode::Raw, ShiftMode::PaperShift, ShiftMode::ExactInverse];
-
     /// Name on screen.
     pub fn label(self) -> &'static str {
         match self {
@@ -199,16 +196,6 @@ pub struct DepthChain {
     pub offset: [f64; 2],
 }
 
-/// Meters after a correction.
-fn corrected(fit: &Correction, meters: &DepthMap) -> Result<DepthMap, PostprocessError> {
-    if !fit.fits(meters.size()) {
-        return Err(PostprocessError::Correction(meters.size()));
-    }
-    let placed = fit.placed(meters);
-    let leveled = fit.leveled(&placed);
-    Ok(fit.answered(&placed, &fit.weighed(&placed, &leveled)))
-}
-
 /// A kind of image on the way.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Stage {
@@ -306,7 +293,10 @@ impl DepthChain {
             look(Stage::Meters, &depth);
         }
         if let Some(correction) = &self.correction {
-            depth = corrected(correction, &depth)?;
+            if !correction.fits(depth.size()) {
+                return Err(PostprocessError::Correction(depth.size()));
+            }
+            depth = correction.apply(&depth);
             look(Stage::Meters, &depth);
         }
         let resized = self.resampling.resize(&depth, self.size[0], self.size[1]);

@@ -368,7 +368,7 @@ impl ReadAs {
                 });
             }
             Self::ImageSwapFingers => {
-                let colors: Vec<_> = sample.pads.iter().map(|touch| color_of(touch.as_ref())).collect();
+                let colors: Vec<_> = sample.pads.iter().map(|touch| touch.as_ref()?.color().cloned()).collect();
                 if let [Some(_), Some(_)] = &colors[..] {
                     for (touch, color) in sample.pads.iter_mut().zip(colors.into_iter().rev()) {
                         if let (Some(touch), Some(color)) = (touch.as_mut().and_then(PadTouch::color_mut), color) {
@@ -423,7 +423,8 @@ impl ReadAs {
                 // The touched image that gives this difference.
                 if let Some(ColorImages { raw, reference }) = &mut touch.images {
                     *reference = reference.map(|pixel| pixel.map(|v| v.rem_euclid(256.0)));
-                    *raw = sum(reference, &touch.difference);
+                    raw.clone_from(reference);
+                    raw.add(&touch.difference);
                 }
             }),
         }
@@ -441,18 +442,6 @@ impl ReadAs {
 /// The value modulo 256 that is nearest to 0.
 fn wrapped(v: f32) -> f32 {
     (v + 128.0).rem_euclid(256.0) - 128.0
-}
-
-fn sum(a: &RgbGrid, b: &RgbGrid) -> RgbGrid {
-    let mut out = a.clone();
-    for (p, q) in out.as_mut_slice().iter_mut().zip(b.as_slice()) {
-        p.iter_mut().zip(q).for_each(|(p, q)| *p += q);
-    }
-    out
-}
-
-fn color_of(touch: Option<&PadTouch>) -> Option<ColorTouch> {
-    touch?.color().cloned()
 }
 
 fn each_depth(sample: &mut Sample, change: impl Fn(&mut DepthTouch)) {
@@ -483,7 +472,8 @@ fn of_images(sample: &mut Sample, which: Images, change: impl Fn(&mut [f32; 3]))
         if which != Images::Touch {
             all(reference);
         }
-        touch.difference = sum(raw, &reference.map(|p| p.map(|v| -v)));
+        touch.difference = reference.map(|p| p.map(|v| -v));
+        touch.difference.add(raw);
     });
 }
 

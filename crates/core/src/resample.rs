@@ -30,7 +30,7 @@ pub enum Resampling {
 impl Resampling {
     /// Resizes a one-channel image to `width × height` pixels.
     pub fn resize(self, image: &Grid<f32>, width: usize, height: usize) -> Grid<f32> {
-        resize_gray(image, width, height, self)
+        resize(&image.map(|&v| [v]), width, height, self).map(|[v]| *v)
     }
 
     /// Resizes a color image to `width × height` pixels, channel by channel.
@@ -43,12 +43,12 @@ impl Resampling {
 ///
 /// NaN pixels make every target pixel NaN that weighs them in. An empty source gives an image of NaN.
 pub fn bilinear(image: &Grid<f32>, width: usize, height: usize) -> Grid<f32> {
-    resize_gray(image, width, height, Resampling::Bilinear)
+    Resampling::Bilinear.resize(image, width, height)
 }
 
 /// The plain mean of the source pixels `floor(i·in/out) .. ceil((i+1)·in/out)`, as torch's `mode="area"`.
 pub fn area(image: &Grid<f32>, width: usize, height: usize) -> Grid<f32> {
-    resize_gray(image, width, height, Resampling::Area)
+    Resampling::Area.resize(image, width, height)
 }
 
 /// The image moved by `[x, y]` pixels (to the right, down), with two taps per axis; the border is repeated where nothing
@@ -137,10 +137,6 @@ fn cubic_weights(t: f64) -> [f64; 4] {
     let near = |x: f64| ((BICUBIC_A + 2.0) * x - (BICUBIC_A + 3.0)) * x * x + 1.0;
     let far = |x: f64| ((BICUBIC_A * x - 5.0 * BICUBIC_A) * x + 8.0 * BICUBIC_A) * x - 4.0 * BICUBIC_A;
     [far(t + 1.0), near(t), near(1.0 - t), far(2.0 - t)]
-}
-
-fn resize_gray(image: &Grid<f32>, width: usize, height: usize, kind: Resampling) -> Grid<f32> {
-    resize(&image.map(|&v| [v]), width, height, kind).map(|[v]| *v)
 }
 
 /// Weighted sums of pixels of `N` channels, in f64.

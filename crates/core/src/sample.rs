@@ -54,8 +54,9 @@ impl Default for Sample {
 }
 
 /// Scale: where the meters of a sample come from.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, strum::IntoStaticStr)]
 #[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
 pub enum Scale {
     /// The source stores meters.
     #[default]
@@ -67,10 +68,7 @@ pub enum Scale {
 impl Scale {
     /// The name in files.
     pub fn key(self) -> &'static str {
-        match self {
-            Self::Measured => "measured",
-            Self::Assumed => "assumed",
-        }
+        self.into()
     }
 }
 

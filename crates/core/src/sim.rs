@@ -96,7 +96,7 @@ pub fn nominal_camera(finger: PadId) -> DepthCamera {
     let half_thickness_m = super::catalog::tools()[0].half_thickness_m;
     let config = BubbleConfig::default();
     let grasp_from_camera = grasp_from_camera(finger, half_thickness_m);
-    let rays = depth_camera::Rays::new(finger, INTRINSICS, grasp_from_camera);
+    let rays = depth_camera::Rays::new(finger, grasp_from_camera);
     let dome = Dome::new(&config, half_thickness_m, finger);
     let depth_reference = depth_camera::dome_depth(&rays, &dome).map(|z| z - config.reference_m as f32);
     DepthCamera { depth_reference, intrinsics: INTRINSICS, crop: lab::BUBBLE.crop, grasp_from_camera }
@@ -107,7 +107,7 @@ fn bubble_touch(config: &BubbleConfig, tool: &ToolSpec, membrane: &Membrane, fin
     let nearer = outward(finger) * (config.press_m - config::NOMINAL_PRESS_M);
     let nominal = DAffine3::from_translation(DVec3::X * nearer) * grasp_from_camera(finger, tool.half_thickness_m);
     let truly = nominal * calibration_error(config, finger, seed);
-    let rays = depth_camera::Rays::new(finger, INTRINSICS, truly);
+    let rays = depth_camera::Rays::new(finger, truly);
     let depth_reference = depth_camera::dome_depth(&rays, membrane.dome()).map(|z| z - config.reference_m as f32);
     let (depth, contact) = depth_camera::membrane_depth(&rays, membrane);
     let imprint = depth_camera::measure(&depth_reference, &depth, config, finger, seed);

@@ -11,7 +11,7 @@
 //! Left out: the free membrane moves with the hand and not with the tool, which lengths of some millimeters do not show; the
 //! rim's true outline, growing tension, and the air that the tool displaces.
 
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 
 use crate::frames::PlanarPose;
 use crate::mesh::TriMesh;
@@ -58,12 +58,7 @@ impl Sheet {
 ///
 /// Holes, overlapping parts and inverted triangles do not matter; triangles with corners that are not finite are left out.
 pub(crate) fn heights(mesh: &TriMesh, side: f64) -> Option<Sheet> {
-    let corners = mesh.vertices.len();
-    let triangles: Vec<[DVec3; 3]> = (0..mesh.triangles.len())
-        .filter(|&i| mesh.triangles[i].iter().all(|&v| (v as usize) < corners))
-        .map(|i| mesh.corners(i))
-        .filter(|t| t.iter().all(|c| c.is_finite()))
-        .collect();
+    let triangles = mesh.sound_triangles();
     let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
     for corner in triangles.iter().flatten() {
         let yz = DVec2::new(corner.y, corner.z);
@@ -139,10 +134,6 @@ impl FreeShape {
 /// Height over the free membrane, and over the middle plane where that reaches beyond it, of the smallest sheet over `heights`
 /// and the middle plane that hangs from the free membrane at the rim.
 pub(crate) fn lifted(heights: &Sheet, free: &FreeShape) -> Sheet {
-    lifted_by(heights, free, |problem| problem.solve(LEVELS, SWEEPS))
-}
-
-fn lifted_by(heights: &Sheet, free: &FreeShape, solve: impl FnOnce(&Problem<'_>) -> Field) -> Sheet {
     let (columns, rows) = (heights.field.columns, heights.field.rows);
     let place = |k: usize| heights.origin + DVec2::new((k % columns) as f64, (k / columns) as f64) * heights.step_m;
     let dome: Vec<f32> = (0..columns * rows).map(|k| free.at(place(k)) as f32).collect();
@@ -155,7 +146,7 @@ fn lifted_by(heights: &Sheet, free: &FreeShape, solve: impl FnOnce(&Problem<'_>)
     let load = ((1.0 - PRESSED) * (free.bend.x + free.bend.y)) as f32;
     let problem =
         Problem { obstacle: &obstacle, free: &within, load, more: None, stiffness: 0.0, step: heights.step_m as f32 };
-    let mut field = solve(&problem);
+    let mut field = problem.solve(LEVELS, SWEEPS);
     for (k, lifted) in field.values.iter_mut().enumerate() {
         *lifted = if within[k] { *lifted + dome[k].min(0.0) } else { 0.0 };
     }
@@ -200,6 +191,7 @@ fn bending(sheet: &Field, load: f32) -> Field {
 mod tests {
     use super::*;
     use crate::align::testing::cuboid;
+    use glam::DVec3;
 
     const HERE: PlanarPose = PlanarPose { theta_rad: 0.0, y_m: 0.0, z_m: 0.0 };
     /// A membrane like the first simulator's, which reaches the middle plane, and one like the lab's, which does not.

@@ -7,7 +7,7 @@ pub mod subject;
 use std::borrow::Cow;
 
 use crate::error::TaskError;
-use crate::io::dataset::{ASSUMED_IMPRINT_RANGE_M, Dataset, assumed_meters};
+use crate::io::dataset::{ASSUMED_IMPRINT_RANGE_M, Dataset, assumed_meters, imprint_from_tile};
 use crate::io::error::FileError;
 use crate::steps::imprint::picture_of;
 use crate::steps::prediction::Prediction;
@@ -104,9 +104,9 @@ pub struct Beside {
 /// If it cannot be read.
 pub fn beside(dataset: &Dataset, id: PairId, sample: &Sample) -> Result<Option<Beside>, TaskError> {
     let fail = |err: FileError| TaskError::from_error("Stored picture", &err).with_hint(err.hint);
-    let tile = dataset.vqvae_tile(id, sample.laid).map_err(fail)?.as_ref().map(assumed_meters);
-    let imprint = dataset.vqvae_imprint(id, sample.laid).map_err(fail)?;
-    Ok(tile.zip(imprint).map(|(tile, imprint)| Beside { tile, imprint }))
+    let tile = dataset.vqvae_tile(id, sample.laid).map_err(fail)?;
+    let both = |tile| Beside { tile: assumed_meters(&tile), imprint: imprint_from_tile(&tile, &dataset.rig) };
+    Ok(tile.map(both))
 }
 
 /// An imprint as the picture of its sensor shows it: turned as that lies, and as large (`[width, height]`).

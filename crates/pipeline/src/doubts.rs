@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use crate::error::TaskError;
 use crate::io::dataset::{Dataset, READ_AS_FILE, SourceKind, write_read_as};
 use crate::job::JobCx;
+use crate::pairs::by_tool;
 use crate::steps::imprint::imprint_of;
 use crate::steps::models::Models;
 use crate::steps::predict::Generating;
@@ -135,15 +136,11 @@ pub(crate) fn check_truth(dataset: &Dataset, what: &str) -> Result<(), TaskError
 
 /// About so many pairs, of as many tools as there are, spread over the pairs of each.
 fn handful(dataset: &Dataset, pairs: usize) -> Vec<PairId> {
-    let mut by_tool: BTreeMap<Option<&str>, Vec<PairId>> = BTreeMap::new();
-    for (id, entry) in (0u32..).zip(&dataset.index.pairs) {
-        by_tool.entry(entry.tool.as_deref()).or_default().push(PairId(id));
-    }
-    let tools: Vec<&Vec<PairId>> = by_tool.values().collect();
+    let tools: Vec<Vec<PairId>> = by_tool(dataset).into_values().collect();
     let taken = tools.len().min(pairs);
     let mut ids: Vec<PairId> = Vec::new();
     for slot in 0..taken {
-        let of_tool = tools[slot * tools.len() / taken];
+        let of_tool = &tools[slot * tools.len() / taken];
         let count = (pairs / taken + usize::from(slot < pairs % taken)).min(of_tool.len());
         ids.extend((0..count).map(|i| of_tool[(2 * i + 1) * of_tool.len() / (2 * count)]));
     }

@@ -330,39 +330,19 @@ impl Following {
                 continue;
             };
             let files = dataset.pair_files(id);
-            let known = self.seen.get_mut(&entry.name);
             // What was written after the start is new, even where it was there before the first look.
             let fresh = !first || stamp.closed >= self.started;
-            let wanted = fresh || self.existing;
-            match known {
+            let (waiting, queued, completed) = match self.seen.get(&entry.name) {
                 Some(seen) if seen.stamp == stamp && seen.files == files => continue,
-                Some(seen) => {
-                    let queued = seen.waiting;
-                    let completed = !queued && seen.stamp == stamp && seen.file == file;
-                    *seen = FollowedPair { id, file, files, stamp, waiting: true, completed, since: now, retry: now };
-                    if queued {
-                        continue;
-                    }
-                }
-                None => {
-                    let seen = FollowedPair {
-                        id,
-                        file,
-                        files,
-                        stamp,
-                        waiting: wanted,
-                        completed: false,
-                        since: now,
-                        retry: now,
-                    };
-                    self.seen.insert(entry.name.clone(), seen);
-                    if !wanted {
-                        continue;
-                    }
-                }
+                Some(seen) => (true, seen.waiting, !seen.waiting && seen.stamp == stamp && seen.file == file),
+                None => (fresh || self.existing, false, false),
+            };
+            let seen = FollowedPair { id, file, files, stamp, waiting, completed, since: now, retry: now };
+            self.seen.insert(entry.name.clone(), seen);
+            if waiting && !queued {
+                let queue = if fresh { &mut self.fresh } else { &mut self.backlog };
+                queue.push_back(entry.name.clone());
             }
-            let queue = if fresh { &mut self.fresh } else { &mut self.backlog };
-            queue.push_back(entry.name.clone());
         }
     }
 }

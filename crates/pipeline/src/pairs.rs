@@ -1,11 +1,24 @@
 //! Choice of pairs for a pass over a data set.
 
+use std::collections::BTreeMap;
+
+use crate::io::dataset::Dataset;
+use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::{PadId, Rig};
 
 /// The positions of at most `limit` of `len` things, spread evenly; all of them without a limit.
 pub fn spread(len: usize, limit: Option<usize>) -> impl ExactSizeIterator<Item = usize> {
     let taken = limit.map_or(len, |limit| limit.min(len));
     (0..taken).map(move |i| i * len / taken)
+}
+
+/// The pairs by tool, in the order of the index.
+pub(crate) fn by_tool(dataset: &Dataset) -> BTreeMap<Option<&str>, Vec<PairId>> {
+    let mut tools: BTreeMap<Option<&str>, Vec<PairId>> = BTreeMap::new();
+    for (id, entry) in (0u32..).zip(&dataset.index.pairs) {
+        tools.entry(entry.tool.as_deref()).or_default().push(PairId(id));
+    }
+    tools
 }
 
 /// The pads of a rig that a name means: one, or all of them by `both`. A rig with a single one has no other, however it is

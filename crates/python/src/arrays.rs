@@ -2,10 +2,8 @@
 
 use std::borrow::Cow;
 
-use glam::{DAffine3, DVec3};
-use numpy::{
-    Element, PyArray, PyArray1, PyArrayDyn, PyArrayMethods as _, PyReadonlyArray2, PyUntypedArrayMethods as _,
-};
+use glam::{DAffine3, DMat4, DVec3};
+use numpy::{Element, PyArray1, PyArrayDyn, PyArrayMethods as _, PyReadonlyArray2, PyUntypedArrayMethods as _};
 use pyo3::prelude::*;
 use touch2touch_core::grid::{Grid, RgbGrid};
 
@@ -88,38 +86,17 @@ pub(crate) fn points_of<'a>(array: &'a PyReadonlyArray2<'_, f64>, what: &str) ->
     })
 }
 
-/// A transform as 4 x 4, which maps columns.
+/// The 4 x 4 numbers of a transform, which maps columns, row by row.
+pub(crate) fn rows(transform: &DAffine3) -> [f64; 16] {
+    DMat4::from(*transform).transpose().to_cols_array()
+}
+
+/// A transform as 4 x 4: its [`rows`].
 ///
 /// # Errors
 /// None in practice.
 pub(crate) fn transform<'py>(py: Python<'py>, transform: &DAffine3) -> PyResult<Array<'py, f64>> {
-    transforms(py, std::iter::once(Some(*transform)), false)
-}
-
-/// Transforms of the pads as (pads, 4, 4), NaN where there is none; or one alone as (4, 4).
-///
-/// # Errors
-/// None in practice.
-pub(crate) fn transforms<'py>(
-    py: Python<'py>,
-    transforms: impl Iterator<Item = Option<DAffine3>>,
-    stacked: bool,
-) -> PyResult<Array<'py, f64>> {
-    let mut values = Vec::new();
-    for transform in transforms {
-        match transform {
-            Some(t) => {
-                let [x, y, z, p] = [t.matrix3.x_axis, t.matrix3.y_axis, t.matrix3.z_axis, t.translation];
-                for row in 0..3 {
-                    values.extend([x[row], y[row], z[row], p[row]]);
-                }
-                values.extend([0.0, 0.0, 0.0, 1.0]);
-            }
-            None => values.resize(values.len() + 16, f64::NAN),
-        }
-    }
-    let shape: &[usize] = if stacked { &[values.len() / 16, 4, 4] } else { &[4, 4] };
-    array(py, values, shape)
+    array(py, rows(transform).to_vec(), &[4, 4])
 }
 
 /// An image of an array (height, width).
@@ -133,15 +110,4 @@ pub(crate) fn image_of<T: Element + Copy>(image: &PyReadonlyArray2<'_, T>, what:
         _ => image.as_array().iter().copied().collect(),
     };
     Grid::from_vec(width, height, values).map_err(|err| refused(format!("{what}: {err}")))
-}
-
-/// Numbers as a square or longer table.
-///
-/// # Errors
-/// None in practice.
-pub(crate) fn table<'py, const N: usize>(
-    py: Python<'py>,
-    rows: &[[f64; N]],
-) -> PyResult<Bound<'py, PyArray<f64, numpy::IxDyn>>> {
-    array(py, rows.iter().flatten().copied().collect(), &[rows.len(), N])
 }

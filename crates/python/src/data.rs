@@ -21,7 +21,7 @@ use touch2touch_pipeline::labels::{Labels, PairLabels, Review};
 use touch2touch_pipeline::steps::estimate::Touch;
 use touch2touch_pipeline::steps::tool::load_tool;
 
-use crate::arrays::{Array, array, stack, stack_rgb, transform, transforms};
+use crate::arrays::{Array, array, rows, stack, stack_rgb, transform};
 use crate::picture;
 use crate::process::{away, failed, refused};
 use crate::tables::Scores;
@@ -275,8 +275,19 @@ impl Pair {
         self.sample.rig.pads().map(move |pad: PadId| self.sample.pad(pad).and_then(&of))
     }
 
-    fn cameras<T>(&self, of: impl Fn(&DepthCamera) -> T) -> Vec<Option<T>> {
-        self.pads(|touch| touch.camera().map(&of)).collect()
+    /// A matrix of each camera, of `side` rows; NaN for a pad without one, `None` without any.
+    fn cameras<'py, const N: usize>(
+        &self,
+        py: Python<'py>,
+        side: usize,
+        matrix: impl Fn(&DepthCamera) -> [f64; N],
+    ) -> PyResult<Option<Array<'py, f64>>> {
+        let all: Vec<Option<[f64; N]>> = self.pads(|touch| touch.camera().map(&matrix)).collect();
+        if all.iter().all(Option::is_none) {
+            return Ok(None);
+        }
+        let values = all.iter().flat_map(|matrix| matrix.unwrap_or([f64::NAN; N])).collect();
+        array(py, values, &[all.len(), side, side]).map(Some)
     }
 
     /// Labels that people gave it, as they are on the disk now.
@@ -382,26 +393,16 @@ impl Pair {
     #[getter]
     #[pyo3(name = "K")]
     fn intrinsics<'py>(&self, py: Python<'py>) -> PyResult<Option<Array<'py, f64>>> {
-        let matrix = |camera: &DepthCamera| {
+        self.cameras(py, 3, |camera| {
             let (k, [x, y]) = (camera.intrinsics, camera.crop.offset.map(|o| o as f64));
             [k.fx, 0.0, k.cx - x, 0.0, k.fy, k.cy - y, 0.0, 0.0, 1.0]
-        };
-        let all = self.cameras(matrix);
-        if all.iter().all(Option::is_none) {
-            return Ok(None);
-        }
-        let values = all.iter().flat_map(|matrix| matrix.unwrap_or([f64::NAN; 9])).collect();
-        array(py, values, &[all.len(), 3, 3]).map(Some)
+        })
     }
 
     /// Places of the depth cameras: (2, 4, 4) float64, camera frame to grasp frame, meters; `None` without a camera.
     #[getter]
     fn grasp_from_camera<'py>(&self, py: Python<'py>) -> PyResult<Option<Array<'py, f64>>> {
-        let all = self.cameras(|camera| camera.grasp_from_camera);
-        if all.iter().all(Option::is_none) {
-            return Ok(None);
-        }
-        transforms(py, all.into_iter(), true).map(Some)
+        self.cameras(py, 4, |camera| rows(&camera.grasp_from_camera))
     }
 
     /// The true pose of the tool in the hand: `grasp_from_object` (4, 4) float64, meters; `None` where it is not known.

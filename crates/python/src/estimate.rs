@@ -17,7 +17,7 @@ use touch2touch_pipeline::steps::estimate::{self as way, Estimate as Results};
 use touch2touch_pipeline::steps::pose::{PoseResult, pose};
 use touch2touch_pipeline::steps::recipe::{Recipe as Whole, Stage};
 
-use crate::arrays::{Array, array, points as points_array, points_of, stack, table, transform};
+use crate::arrays::{Array, array, points as points_array, points_of, stack, transform};
 use crate::data::Pair;
 use crate::picture;
 use crate::process::{Process, failed, refused, watched};
@@ -62,7 +62,8 @@ impl Pose {
     #[getter]
     fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Option<Array<'py, f64>>> {
         let evidence = self.result.report.evidence.as_ref();
-        evidence.map(|evidence| table(py, &evidence.uncertainty.covariance)).transpose()
+        let covariance = evidence.map(|evidence| evidence.uncertainty.covariance.concat());
+        covariance.map(|covariance| array(py, covariance, &[3, 3])).transpose()
     }
 
     /// Reliance that it deserves, without the truth: "good", "check" or "wrong"; `None` without evidence.

@@ -38,11 +38,6 @@ impl Default for Augment {
 }
 
 impl Augment {
-    /// No variation at all.
-    pub fn none() -> Self {
-        Self { shift: 0.0, colors: 0.0, gain: 0.0, blur: 0.0, noise: 0.0, clipped: 0.0, ..Self::default() }
-    }
-
     /// A variation of a picture (in its own scale) and of its imprint. `deviation` is the spread of the input, `mean` the
     /// mean imprint of the pad: what lies in the sensor and does not move with the touch.
     pub(crate) fn vary(
@@ -161,6 +156,7 @@ impl Clipping {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fixture::unvaried;
     use crate::random::Purpose;
 
     const SIDE: usize = 16;
@@ -178,7 +174,7 @@ mod tests {
     fn without_variation_a_pair_stays_as_it_is() {
         let (picture, imprint) = pair();
         let set = Set { mean: &[0.0; SIDE * SIDE], deviation: [1.0; 3], clippings: &[] };
-        assert_eq!(Augment::none().vary(&picture, &imprint, &set, &mut random(1)), (picture, imprint));
+        assert_eq!(unvaried().vary(&picture, &imprint, &set, &mut random(1)), (picture, imprint));
     }
 
     #[test]
@@ -199,7 +195,7 @@ mod tests {
     #[test]
     fn the_imprint_moves_with_the_picture() {
         let dot = |index: usize| (0..SIDE * SIDE).map(|i| f32::from(u8::from(i == index))).collect::<Vec<_>>();
-        let augment = Augment { imprint_per_picture: [1.0, 1.0], shift: 3.0, ..Augment::none() };
+        let augment = Augment { imprint_per_picture: [1.0, 1.0], shift: 3.0, ..unvaried() };
         let set = Set { mean: &[0.0; SIDE * SIDE], deviation: [1.0; 3], clippings: &[] };
         let picture = dot(8 * SIDE + 8).repeat(3);
         let (moved, imprint) = augment.vary(&picture, &dot(8 * SIDE + 8), &set, &mut random(2));

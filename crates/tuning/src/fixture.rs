@@ -91,12 +91,17 @@ pub(crate) fn identity(pads: usize, side: usize) -> Placement {
     Placement { line: [1.0, 0.0], shift: vec![[0.0; 2]; pads], field: vec![vec![0.0; side * side]; pads] }
 }
 
+/// No variation at all.
+pub(crate) fn unvaried() -> Augment {
+    Augment { shift: 0.0, colors: 0.0, gain: 0.0, blur: 0.0, noise: 0.0, clipped: 0.0, ..Augment::default() }
+}
+
 /// A short plan without variations, whose rates suit a tiny network.
 pub(crate) fn config() -> Config {
     Config {
         steps: 8,
         batch: 4,
-        augment: Augment::none(),
+        augment: unvaried(),
         threads: Some(2),
         anchor: 0.0,
         simulated: 0.0,

@@ -30,13 +30,16 @@ pub(crate) fn taps(side: usize, shift: f64) -> Vec<Tap> {
     (0..side).map(tap).collect()
 }
 
+/// The rows of an image, read with the taps of its columns.
+pub(crate) fn across(image: &[f32], columns: &[Tap]) -> Vec<f32> {
+    let rows = image.chunks_exact(columns.len());
+    rows.flat_map(|row| columns.iter().map(|tap| tap.between(row[tap.low], row[tap.low + 1]))).collect()
+}
+
 /// The image moved down and right by sub-pixel amounts, interpolated linearly, the border repeated.
 pub(crate) fn shifted(image: &[f32], side: usize, [down, right]: [f64; 2]) -> Vec<f32> {
     let (rows, columns) = (taps(side, down), taps(side, right));
-    let mut across = Vec::with_capacity(image.len());
-    for row in image.chunks_exact(side) {
-        across.extend(columns.iter().map(|tap| tap.between(row[tap.low], row[tap.low + 1])));
-    }
+    let across = across(image, &columns);
     let mut moved = Vec::with_capacity(image.len());
     for tap in rows {
         let (upper, lower) = across[tap.low * side..][..2 * side].split_at(side);

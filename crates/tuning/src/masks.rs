@@ -4,6 +4,8 @@ mod sensors;
 
 pub use sensors::Sensors;
 
+use std::ops::Range;
+
 use crate::error::{Error, Result};
 use crate::nets::mask::{self, MASK};
 use crate::onnx::Onnx;
@@ -13,7 +15,7 @@ use crate::params::{Leaves, Params};
 use crate::random::{Purpose, Random, dealt};
 use crate::state::{Origin, OriginBuilder};
 use crate::tape::Tensor;
-use crate::trainer::{Objective, PARTS, Trainer, descend};
+use crate::trainer::{Objective, Trainer, descend};
 
 /// A mask network as its bundle describes it: where tuning begins.
 #[derive(Clone, Debug)]
@@ -117,15 +119,10 @@ impl Objective for Recipe {
         Some(Rate { rate: self.config.rate, decay: DECAY, anchor: 0.0 })
     }
 
-    fn parts(&self, _: usize) -> usize {
-        PARTS.min(self.config.batch)
-    }
-
-    fn part(&self, step: usize, part: usize) -> Part {
+    fn part(&self, step: usize, places: Range<usize>) -> Part {
         let c = &self.config;
-        let parts = self.parts(step);
         let mut items = Part::default();
-        for place in part * c.batch / parts..(part + 1) * c.batch / parts {
+        for place in places {
             let touch = &self.touches[dealt(c.seed, &self.all, step * c.batch + place, 0)];
             let random = &mut Random::new(c.seed, Purpose::Variation, step, place);
             let varied = c.sensors.vary(touch, self.start.size, random);
@@ -181,17 +178,17 @@ impl MaskTuner {
         let params = mask::read(&file)?;
         check(&touches, start.size)?;
         let origin = origin(start, &touches, &config);
-        let (steps, threads) = (config.steps, config.threads);
+        let (batch, steps, threads) = (config.batch, config.steps, config.threads);
         let start = MaskStart { file: Vec::new(), ..start.clone() };
         let recipe = Recipe { start, all: (0..touches.len()).collect(), touches, config };
-        let mut trainer = Trainer::new(recipe, params, steps, threads);
+        let mut trainer = Trainer::new(recipe, params, batch, steps, threads);
         state.map_or(Ok(()), |state| trainer.restore(origin, state))?;
         Ok(Self { file, origin, trainer })
     }
 
     /// The network's ONNX file as it is now (the running mean of the weights), as long as before.
     pub fn tuned(&self) -> Vec<u8> {
-        let params = self.trainer.average();
+        let params = &self.trainer.average;
         self.file
             .with(|name| params.get(&format!("{MASK}{name}")).map(|entry| entry.values.to_vec()).unwrap_or_default())
     }
@@ -202,7 +199,7 @@ impl MaskTuner {
     /// # Errors
     /// [`Error::Mask`] with the place of an imprint that has another size.
     pub fn probabilities(&self, imprints: &[&[f32]]) -> Result<Vec<Vec<f32>>> {
-        self.ask(self.trainer.average(), imprints)
+        self.ask(&self.trainer.average, imprints)
     }
 
     /// Probability of contact of each pixel, by the network before the first step.
@@ -221,7 +218,7 @@ impl MaskTuner {
             let why = format!("its imprint has {} values instead of {pixels}", imprints[index].len());
             return Err(Error::Mask { index, why });
         }
-        Ok(self.trainer.side_by_side(imprints.len(), |i| {
+        Ok(self.trainer.workers.run(imprints.len(), |i| {
             let meters = imprints[i].iter();
             let input: Vec<f32> = meters.map(|&m| start.scaled(if m.is_finite() { m } else { 0.0 })).collect();
             let logits = mask::segment(&params.leaves(|_| false), &Tensor::new(&[1, 1, height, width], input));

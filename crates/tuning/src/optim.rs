@@ -1,5 +1,5 @@
 //! [`AdamW`]: the optimizer, with the gradient clipped over all weights; [`ramp`]: how its rates change;
-//! [`Average`]: the running mean of the weights.
+//! [`follow`]: the running mean of the weights.
 
 use std::sync::Arc;
 
@@ -91,38 +91,21 @@ pub(crate) fn norm(gradient: &[Option<Vec<f32>>]) -> f64 {
     gradient.iter().flatten().flatten().map(|&value| f64::from(value).powi(2)).sum::<f64>().sqrt()
 }
 
-/// Running mean of the weights. It forgets faster at the beginning, when they still move far.
-#[derive(Clone, Debug)]
-pub struct Average {
-    pub(crate) values: Params,
-}
-
-/// Largest share of the mean that a step keeps.
+/// Largest share of the running mean of the weights that a step keeps.
 const KEPT: f32 = 0.95;
 
-impl Average {
-    /// The mean before the first step: the weights themselves.
-    pub fn new(params: &Params) -> Self {
-        Self { values: params.clone() }
-    }
-
-    /// Takes in the weights after a step, counted from 0.
-    pub fn add(&mut self, params: &Params, step: usize) {
-        let kept = KEPT.min((2 + step) as f32 / (6 + step) as f32);
-        for (mean, entry) in self.values.values_mut().zip(params.entries()) {
-            // What is not trained stays shared.
-            if Arc::ptr_eq(mean, &entry.values) {
-                continue;
-            }
-            for (mean, value) in Arc::make_mut(mean).iter_mut().zip(entry.values.iter()) {
-                *mean += (value - *mean) * (1.0 - kept);
-            }
+/// Takes the weights after a step, counted from 0, into their running mean, which begins as the weights themselves. It
+/// forgets faster at the beginning, when they still move far.
+pub(crate) fn follow(average: &mut Params, params: &Params, step: usize) {
+    let kept = KEPT.min((2 + step) as f32 / (6 + step) as f32);
+    for (mean, entry) in average.values_mut().zip(params.entries()) {
+        // What is not trained stays shared.
+        if Arc::ptr_eq(mean, &entry.values) {
+            continue;
         }
-    }
-
-    /// The mean.
-    pub(crate) fn params(&self) -> &Params {
-        &self.values
+        for (mean, value) in Arc::make_mut(mean).iter_mut().zip(entry.values.iter()) {
+            *mean += (value - *mean) * (1.0 - kept);
+        }
     }
 }
 
@@ -203,8 +186,8 @@ mod tests {
 
     #[test]
     fn the_mean_follows_the_weights() {
-        let mut average = Average::new(&params(&[0.0]));
-        (0..400).for_each(|step| average.add(&params(&[1.0]), step));
-        assert!((average.params().entries()[0].values[0] - 1.0).abs() < 1e-4);
+        let mut average = params(&[0.0]);
+        (0..400).for_each(|step| follow(&mut average, &params(&[1.0]), step));
+        assert!((average.entries()[0].values[0] - 1.0).abs() < 1e-4);
     }
 }

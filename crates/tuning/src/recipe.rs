@@ -1,6 +1,8 @@
 //! [`Recipe`]: the objective of the generator. It is unrolled as it is used: from zeros or noise to an imprint in one
 //! denoising step, sometimes two, and through what lies behind the decoder.
 
+use std::ops::Range;
+
 use crate::augment::{Augment, Clipping, Set};
 use crate::config::Config;
 use crate::nets::generator::{self, DECODER, LATENT, Schedule, Sizes};
@@ -10,7 +12,7 @@ use crate::pair::Pair;
 use crate::params::Leaves;
 use crate::random::{Purpose, Random, dealt};
 use crate::tape::Tensor;
-use crate::trainer::{Objective, PARTS};
+use crate::trainer::Objective;
 
 /// The straight line behind the decoder: factor and offset.
 pub(crate) const LINE: &str = "line";
@@ -147,15 +149,9 @@ impl Objective for Recipe {
         }
     }
 
-    fn parts(&self, _: usize) -> usize {
-        PARTS.min(self.config.batch)
-    }
-
-    fn part(&self, step: usize, part: usize) -> Part {
+    fn part(&self, step: usize, places: Range<usize>) -> Part {
         let c = &self.config;
         let drawn = self.drawn(step);
-        let parts = self.parts(step);
-        let (first, end) = (part * c.batch / parts, (part + 1) * c.batch / parts);
         let two = Random::new(c.seed, Purpose::Batch, step, 0).happens(c.second);
         let latent = self.model.sizes.latent();
         let mut items = Part {
@@ -165,8 +161,8 @@ impl Objective for Recipe {
             noise: Vec::new(),
             second: two.then(Vec::new),
         };
-        for (place, &index) in drawn.iter().enumerate().take(end).skip(first) {
-            let pair = &self.pairs[index];
+        for place in places {
+            let pair = &self.pairs[drawn[place]];
             let mean = &self.means[pair.frame.unwrap_or(self.model.pads)];
             let set = Set { mean, deviation: self.model.deviation, clippings: &self.clippings };
             let random = &mut Random::new(c.seed, Purpose::Variation, step, place);

@@ -101,13 +101,13 @@ impl<O: Objective> Trainer<O> {
     }
 
     fn kept(&self) -> Vec<&Vec<f32>> {
-        let weights = self.params.entries().iter().chain(self.average.values.entries()).map(|entry| &*entry.values);
+        let weights = self.params.entries().iter().chain(self.average.entries()).map(|entry| &*entry.values);
         let moments = self.optimizer.moments.iter().flatten().flat_map(|m| [&m.first, &m.second]);
         weights.chain(moments).collect()
     }
 
     fn kept_mut(&mut self) -> Vec<&mut Vec<f32>> {
-        let weights = self.params.values_mut().chain(self.average.values.values_mut()).map(Arc::make_mut);
+        let weights = self.params.values_mut().chain(self.average.values_mut()).map(Arc::make_mut);
         let moments = self.optimizer.moments.iter_mut().flatten().flat_map(|m| [&mut m.first, &mut m.second]);
         weights.chain(moments).collect()
     }

@@ -3,15 +3,16 @@
 //! A batch comes in parts of fixed size. Each has a graph of its own, several run side by side, and what they return is
 //! added in their order: the result does not depend on how many cores there are.
 
+use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::error::{Error, Result};
-use crate::optim::{AdamW, Average, Rate, norm, ramp};
+use crate::optim::{AdamW, Rate, follow, norm, ramp};
 use crate::params::{Leaves, Params};
 use crate::tape::{Tensor, backward};
 
 /// Parts of a batch. Fixed: their number decides the order of additions, and so the last bits.
-pub(crate) const PARTS: usize = 4;
+const PARTS: usize = 4;
 
 /// Objective: the loss that is to be made small.
 pub(crate) trait Objective: Sync {
@@ -21,11 +22,8 @@ pub(crate) trait Objective: Sync {
     /// Rate at which an array learns; `None` for one that stays as it is.
     fn rate(&self, name: &str) -> Option<Rate>;
 
-    /// Number of parts of the batch of a step.
-    fn parts(&self, step: usize) -> usize;
-
-    /// A part of the batch of a step, counted from 0. Depends on nothing but its arguments.
-    fn part(&self, step: usize, part: usize) -> Self::Part;
+    /// A part of the batch of a step, counted from 0: that of these places. Depends on nothing but its arguments.
+    fn part(&self, step: usize, places: Range<usize>) -> Self::Part;
 
     /// The part's share of the loss: the sum over the parts is the loss of the batch.
     fn loss(&self, leaves: &Leaves<'_>, part: Self::Part) -> Tensor;
@@ -87,34 +85,32 @@ pub struct StepReport {
 #[derive(Debug)]
 pub(crate) struct Trainer<O> {
     pub(crate) objective: O,
+    batch: usize,
     /// Steps of the whole plan; the rates follow it.
     pub(crate) steps: usize,
     rates: Vec<Option<Rate>>,
     /// The weights before the first step.
     pub(crate) start: Params,
     pub(crate) params: Params,
-    pub(crate) average: Average,
+    /// The running mean of the weights: what the descent is for.
+    pub(crate) average: Params,
     pub(crate) optimizer: AdamW,
     pub(crate) step: usize,
-    workers: Workers,
+    pub(crate) workers: Workers,
 }
 
 type Gradient = Vec<Option<Vec<f32>>>;
 
 impl<O: Objective> Trainer<O> {
     /// Before the first step. Without a number of threads, as many as there are cores; the result does not depend on it.
-    pub(crate) fn new(objective: O, start: Params, steps: usize, threads: Option<usize>) -> Self {
+    pub(crate) fn new(objective: O, start: Params, batch: usize, steps: usize, threads: Option<usize>) -> Self {
         let rates: Vec<Option<Rate>> = start.entries().iter().map(|entry| objective.rate(&entry.name)).collect();
-        let (optimizer, average) = (AdamW::new(&start, &rates), Average::new(&start));
+        let optimizer = AdamW::new(&start, &rates);
         let threads = threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, std::num::NonZero::get));
         // More threads than parts of a batch would have nothing to do.
         let workers = Workers::new(threads.clamp(1, PARTS));
-        Self { objective, steps, rates, params: start.clone(), start, average, optimizer, step: 0, workers }
-    }
-
-    /// The running mean of the weights: what the descent is for.
-    pub(crate) fn average(&self) -> &Params {
-        self.average.params()
+        let (params, average) = (start.clone(), start.clone());
+        Self { objective, batch, steps, rates, start, params, average, optimizer, step: 0, workers }
     }
 
     /// One step down.
@@ -132,19 +128,21 @@ impl<O: Objective> Trainer<O> {
         }
         let factor = ramp(self.step, self.steps);
         self.optimizer.step(&mut self.params, &self.start, &gradient, &self.rates, factor);
-        self.average.add(&self.params, self.step);
+        follow(&mut self.average, &self.params, self.step);
         self.step += 1;
         Ok(StepReport { step: self.step, loss })
     }
 
     /// Loss of the next step's batch, and its gradient.
     pub(crate) fn slope(&self) -> (f32, Gradient) {
+        let (batch, parts) = (self.batch, PARTS.min(self.batch));
         let run = |part: usize| {
+            let places = part * batch / parts..(part + 1) * batch / parts;
             let leaves = self.params.leaves(|name| self.objective.rate(name).is_some());
-            let loss = self.objective.loss(&leaves, self.objective.part(self.step, part));
+            let loss = self.objective.loss(&leaves, self.objective.part(self.step, places));
             (loss.values()[0], leaves.gradient(backward(&loss)))
         };
-        let mut results = self.workers.run(self.objective.parts(self.step), run).into_iter();
+        let mut results = self.workers.run(parts, run).into_iter();
         let Some((mut loss, mut sum)) = results.next() else { return (0.0, vec![None; self.params.entries().len()]) };
         for (value, gradient) in results {
             loss += value;
@@ -153,11 +151,6 @@ impl<O: Objective> Trainer<O> {
             }
         }
         (loss, sum)
-    }
-
-    /// Runs the numbers below `count` on the threads of the steps; results come in the order of the numbers.
-    pub(crate) fn side_by_side<T: Send>(&self, count: usize, act: impl Fn(usize) -> T + Sync) -> Vec<T> {
-        self.workers.run(count, act)
     }
 }
 
@@ -171,7 +164,7 @@ fn add(sum: &mut Option<Vec<f32>>, part: Option<Vec<f32>>) {
 
 /// Pools of one thread each, so that a matrix product within a part stays on its thread.
 #[derive(Debug)]
-struct Workers {
+pub(crate) struct Workers {
     pools: Vec<rayon::ThreadPool>,
 }
 
@@ -185,7 +178,7 @@ impl Workers {
     }
 
     /// Runs the numbers below `count`, as many at a time as there are workers; results come in the order of the numbers.
-    fn run<T: Send>(&self, count: usize, act: impl Fn(usize) -> T + Sync) -> Vec<T> {
+    pub(crate) fn run<T: Send>(&self, count: usize, act: impl Fn(usize) -> T + Sync) -> Vec<T> {
         let next = AtomicUsize::new(0);
         let take = || {
             let mut done = Vec::new();

@@ -107,18 +107,18 @@ impl Tuner {
         if config.steps == 0 {
             return Err(Error::Start { what: "steps", why: "there must be one or more".into() });
         }
-        let Opened { files, model, params } = open(start)?;
+        let (files, model, params) = open(start)?;
         pair::check(&pairs, model.sizes.side, model.pads)?;
         let origin = origin(start, &pairs, &config);
-        let (steps, threads) = (config.steps, config.threads);
-        let mut trainer = Trainer::new(Recipe::new(model, pairs, config), params, steps, threads);
+        let (batch, steps, threads) = (config.batch, config.steps, config.threads);
+        let mut trainer = Trainer::new(Recipe::new(model, pairs, config), params, batch, steps, threads);
         state.map_or(Ok(()), |state| trainer.restore(origin, state))?;
         Ok(Self { files, sampler: start.sampler, origin, trainer })
     }
 
     /// The generator as it is now: the running mean of the weights.
     pub fn tuned(&self) -> Tuned {
-        let params = self.trainer.average();
+        let params = &self.trainer.average;
         let written = |file: &Onnx, prefix: &str| {
             file.with(|name| {
                 params.get(&format!("{prefix}{name}")).map(|entry| entry.values.to_vec()).unwrap_or_default()
@@ -141,8 +141,8 @@ impl Tuner {
     pub fn predict(&self, queries: &[Query<'_>]) -> Result<Vec<Vec<f32>>> {
         let model = &self.trainer.objective.model;
         check_queries(queries, model)?;
-        let draw = |i: usize| draw(model, &self.trainer.average().leaves(|_| false), self.sampler, queries[i]);
-        Ok(self.trainer.side_by_side(queries.len(), draw))
+        let draw = |i: usize| draw(model, &self.trainer.average.leaves(|_| false), self.sampler, queries[i]);
+        Ok(self.trainer.workers.run(queries.len(), draw))
     }
 }
 
@@ -150,13 +150,7 @@ impl Tuner {
 descend!(Tuner);
 
 /// A start, read and checked.
-struct Opened {
-    files: Files,
-    model: Model,
-    params: Params,
-}
-
-fn open(start: &Start) -> Result<Opened> {
+fn open(start: &Start) -> Result<(Files, Model, Params)> {
     let NoiseSchedule { steps, beta_start, beta_end } = start.schedule;
     let refuse = |what, why: &str| Err(Error::Start { what, why: why.to_owned() });
     let inside = |beta: f64| beta > 0.0 && beta < 1.0;
@@ -195,7 +189,7 @@ fn open(start: &Start) -> Result<Opened> {
     let unit = [factor as f32, (factor + (low - zero) / (one - zero)) as f32];
     let schedule = Schedule::scaled_linear(steps, beta_start, beta_end);
     let model = Model { sizes, schedule, mean: start.mean, deviation: start.std, unit, pads };
-    Ok(Opened { files, model, params })
+    Ok((files, model, params))
 }
 
 /// Line, shifts and fields among the weights.

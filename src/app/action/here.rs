@@ -24,9 +24,7 @@ impl Action {
             ),
             Workspace::Align => self.group() == Group::Pose,
             Workspace::Label => self.group() == Group::Mask || self == Self::NextUnfinished,
-            Workspace::Evaluate => {
-                matches!(self, Self::PredictAll | Self::ExportTable | Self::NextWorst)
-            }
+            Workspace::Evaluate => matches!(self, Self::PredictAll | Self::ExportTable | Self::NextWorst),
             Workspace::Adapt => {
                 matches!(self, Self::FitPairs | Self::UseModel | Self::TrainMasks | Self::StartTraining)
             }
@@ -48,7 +46,7 @@ impl Action {
             Kind::Imprint(_) => picture || range || matches!(self, A::MaskVisible | A::MaskOutline),
             Kind::Compare => picture || range,
             Kind::Scene => picture || self.is_of_scene(),
-            Kind::Steps => self.is_of_steps(),
+            Kind::Steps => matches!(self, A::StepBack | A::StepForward | A::PlaySteps | A::OwnStarts),
         }
     }
 
@@ -60,12 +58,6 @@ impl Action {
             || matches!(self, A::Parallel | A::BothClouds);
         look || matches!(self, A::PoseTool | A::NextAnswer | A::IcpFromHere | A::Accept | A::RevertHand)
             || matches!(self, A::PlaySteps | A::PaintIn3d | A::PaintLayers)
-    }
-
-    /// True where it is about the steps of a registration.
-    fn is_of_steps(self) -> bool {
-        use Action as A;
-        matches!(self, A::StepBack | A::StepForward | A::PlaySteps | A::OwnStarts)
     }
 }
 

@@ -99,13 +99,12 @@ fn made_for(state: &State, subject: &Subject, touch: TouchKey) -> Result<(Vec<Pr
 /// Why there is none.
 pub fn subject_key(state: &State, subject: &Subject, finger: PadId) -> Result<ImprintKey, Absent> {
     let touch = state.touch_key(finger).ok_or(Absent::NothingSelected)?;
+    // The ones that the other panes show, made by whatever settings.
+    if let Some(side) = side_of(subject) {
+        return results::imprint_key(state, side, finger);
+    }
     match subject {
-        Subject::Measured => results::imprint_key(state, ImprintSource::Measured, finger),
-        // The one that the other panes show, made by whatever settings.
-        Subject::Predicted(change) if *change == RecipeChange::default() => {
-            results::imprint_key(state, ImprintSource::Predicted, finger)
-        }
-        Subject::Predicted(_) => {
+        Subject::Measured | Subject::Predicted(_) => {
             let (mut recipes, shift) = made_for(state, subject, touch)?;
             let recipe = recipes.pop().ok_or(Absent::NoSuchGenerator)?;
             Ok(ImprintKey::Predicted(recipe, shift))
@@ -280,8 +279,9 @@ pub fn comparison(state: &State, finger: PadId) -> Lookup<'_, Comparison> {
     if state.library.predicts_color(&recipe.bundle) {
         return Lookup::Absent(Absent::PredictsColor);
     }
-    if results::bubble(state, finger).ready().is_none() {
-        return results::bubble(state, finger).without();
+    let bubble = results::touch(state, finger).and_then(Absent::NoBubble, |touch| touch.depth());
+    if bubble.ready().is_none() {
+        return bubble.without();
     }
     state.look(ComparisonKey::measured(recipe.clone(), state.settings.shift)).value()
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::super::jobs::{Job, Worker};
-use super::super::keys::{AboutKey, ImportPlanKey, ImprintSource, MaskPlanKey, Revision, TrainPlanKey};
+use super::super::keys::{AboutKey, ImportPlanKey, ImprintSource, MaskPlanKey, PlanKey, Revision, TrainPlanKey};
 use super::super::pane::Demand;
 use super::super::recipe;
 use super::super::results::{Computes, Demands};
@@ -20,6 +20,11 @@ use touch2touch_pipeline::scores::evaluate::Setup;
 use touch2touch_pipeline::steps::bundles::{BundleInfo, BundleKind};
 use touch2touch_pipeline::steps::recipe::Recipe;
 
+fn plan_key<T>(state: &State, choice: T) -> Option<PlanKey<T>> {
+    let dataset = state.library.open.as_ref()?.seq;
+    Some(PlanKey { dataset, choice, revision: Revision(state.document.last_revision) })
+}
+
 impl Computes for MaskPlanKey {
     fn job(&self, state: &State, _: &Arc<Services>) -> Option<Job<Plan>> {
         let source = state.library.open.as_ref()?.source.clone();
@@ -33,9 +38,7 @@ impl Computes for MaskPlanKey {
 
 /// The plan of the export that the form describes, while the form is open.
 pub fn mask_plan_key(state: &State) -> Option<MaskPlanKey> {
-    let open = state.library.open.as_ref().filter(|_| state.export.asking_masks)?;
-    let revision = Revision(state.document.last_revision);
-    Some(MaskPlanKey { dataset: open.seq, choice: state.export.masks, revision })
+    state.export.asking_masks.then(|| plan_key(state, state.export.masks))?
 }
 
 pub(crate) fn want_mask_plan(wants: &mut Demands<'_>) {
@@ -54,8 +57,7 @@ impl Computes for ImportPlanKey {
 
 /// The plan of the import that the form describes, while the form is open.
 pub fn import_plan_key(state: &State) -> Option<ImportPlanKey> {
-    let (open, form) = (state.library.open.as_ref()?, state.export.importing.clone()?);
-    Some(ImportPlanKey { dataset: open.seq, form, revision: Revision(state.document.last_revision) })
+    plan_key(state, state.export.importing.clone()?)
 }
 
 pub(crate) fn want_import_plan(wants: &mut Demands<'_>) {
@@ -85,9 +87,7 @@ impl Computes for TrainPlanKey {
 
 /// The plan of the training that the pane describes.
 pub(crate) fn train_plan_key(state: &State) -> Option<TrainPlanKey> {
-    let open = state.library.open.as_ref()?;
-    let revision = Revision(state.document.last_revision);
-    Some(TrainPlanKey { dataset: open.seq, choice: state.learn.form.choice, revision })
+    plan_key(state, state.learn.form.choice)
 }
 
 pub(crate) fn want_train_plan(wants: &mut Demands<'_>) {

@@ -41,11 +41,6 @@ impl Computes for RunKey {
     }
 }
 
-/// The recorded registration from the registration's own starts; `None` while its inputs are not there.
-pub(crate) fn run_key(state: &State, source: ImprintSource) -> Option<RunKey> {
-    Some(RunKey { pose: results::pose_key(state, source).ok()??, start: None })
-}
-
 /// The recipe of the recorded run that is looked at; `Ok(None)` while something it is made from is missing.
 ///
 /// # Errors
@@ -105,8 +100,9 @@ pub fn layers(state: &State, source: ImprintSource) -> Lookup<'_, LayerResult> {
 /// The layers of an imprint, or the recorded registration that they need.
 pub(crate) fn want_layers(wants: &mut Demands<'_>, source: ImprintSource) {
     let state = wants.state;
-    let Some(run) = results::run_key(state, source).filter(|_| results::shows_layers(state, source)) else { return };
-    let key = LayersKey(run.pose.clone());
+    let pose = results::pose_key(state, source).ok().flatten();
+    let Some(key) = pose.map(LayersKey).filter(|_| results::shows_layers(state, source)) else { return };
+    let run = key.run();
     match state.results.runs.contains(&run) || state.results.layers.contains(&key) {
         true => wants.ask(key),
         false => wants.ask(run),

@@ -16,7 +16,7 @@ use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::manual::PoseDifference;
 use touch2touch_core::rig::PadId;
-use touch2touch_core::sample::{ColorTouch, DepthTouch, PadTouch, Sample};
+use touch2touch_core::sample::{ColorTouch, PadTouch, Sample};
 use touch2touch_core::symmetry::Symmetry;
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::steps::imprint;
@@ -58,11 +58,6 @@ pub fn touch(state: &State, finger: PadId) -> Lookup<'_, PadTouch> {
 /// The touch of one GelSlim.
 pub fn gelslim(state: &State, finger: PadId) -> Lookup<'_, ColorTouch> {
     touch(state, finger).and_then(Absent::NoGelSlim, |touch| touch.color())
-}
-
-/// The touch of one Soft Bubble.
-pub fn bubble(state: &State, finger: PadId) -> Lookup<'_, DepthTouch> {
-    touch(state, finger).and_then(Absent::NoBubble, |touch| touch.depth())
 }
 
 /// Difference of a pose, `grasp_from_object`, from the true one of the selected pair, up to the tool's symmetry, where it is known.

@@ -296,18 +296,10 @@ impl GenerateSettings {
 
     /// The choices of one generation with a bundle.
     pub fn config(&self, bundle: &BundleInfo) -> GenerateConfig {
-        let own = GenerateConfig {
-            steps: self.steps,
-            eta: self.eta,
-            seed: self.seed,
-            sampler: self.sampler,
-            spacing: self.spacing,
-        };
+        let Self { steps, eta, seed, sampler, spacing, .. } = *self;
         match (self.preset, &bundle.generator) {
-            (Some(preset), Some(g)) => {
-                GenerateConfig { seed: self.seed, ..preset.config(g.defaults, g.training_steps) }
-            }
-            _ => own,
+            (Some(preset), Some(g)) => GenerateConfig { seed, ..preset.config(g.defaults, g.training_steps) },
+            _ => GenerateConfig { steps, eta, seed, sampler, spacing },
         }
     }
 

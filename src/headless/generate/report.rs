@@ -8,14 +8,6 @@ use touch2touch_core::metrics::Unstretched;
 use touch2touch_core::rig::Text;
 use touch2touch_core::sample::Scale;
 
-/// Unit of a prediction's errors.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Unit {
-    Meters,
-    /// Of 0..255: a color picture.
-    Levels,
-}
-
 /// Meaning of PSNR and SSIM of a color picture.
 pub(super) const COLOR_CONVENTION: &str = "difference image of the color sensor on the 0..255 scale, peak and range 255; the split \
     by footprint, contact and pose need depth and are left out";

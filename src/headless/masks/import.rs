@@ -44,14 +44,10 @@ pub(super) fn run(args: &ImportArgs) -> VerbResult {
     let found = if args.dry_run {
         planned
     } else {
-        for line in planned.lines() {
-            output.note(&line);
-        }
+        output.notes("", planned.lines());
         import_masks(&dataset, &setup, &output.job())?
     };
-    for remark in found.unmatched.iter().chain(&found.refused) {
-        output.note(&format!("left out: {}: {}", remark.name, remark.why));
-    }
+    output.notes("left out: ", found.unmatched.iter().chain(&found.refused));
     output.finish(&found, || {
         if args.dry_run {
             [found.lines(), vec!["nothing was written (--dry-run)".into()]].concat().join("\n")

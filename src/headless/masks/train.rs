@@ -79,13 +79,9 @@ pub(super) fn run(args: &TrainArgs) -> VerbResult {
         test_in_train: args.test_in_train,
     };
     let planned = plan(&dataset, &masks, choice)?;
-    for line in planned.lines() {
-        output.note(&line);
-    }
+    output.notes("", planned.lines());
     if args.dry_run {
-        for warning in planned.warnings() {
-            output.note(&format!("note: {warning}"));
-        }
+        output.notes("note: ", planned.warnings());
         let [held_masks, held_pairs] = planned.held_out;
         let said = serde_json::json!({
             "masks": planned.masks(), "pairs": planned.pairs, "tools": planned.tools, "predicted": planned.predicted,
@@ -121,12 +117,8 @@ pub(super) fn run(args: &TrainArgs) -> VerbResult {
     };
     let models = Models::new(if args.no_cache { None } else { kept() });
     let trained = train(&dataset, &masks, &setup, &models, &output.job())?;
-    for remark in &trained.unusable {
-        output.note(&format!("not used: {}: {}", remark.name, remark.why));
-    }
-    for warning in &trained.warnings {
-        output.note(&format!("note: {warning}"));
-    }
+    output.notes("not used: ", &trained.unusable);
+    output.notes("note: ", &trained.warnings);
     let complete = trained.unusable.is_empty();
     output.finish(&trained, || text(&trained))?;
     Ok(complete)

@@ -181,12 +181,8 @@ fn list(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
         if library.opening.is_some() {
             ui.label(caption("Reading the index…", cx.p));
         } else if library.open.is_none() {
-            if empty::show(
-                ui,
-                "Nothing is open",
-                "Drop a folder here",
-                Some(("Open the demo", Action::OpenDemo.tooltip())),
-            ) {
+            let action = Some(("Open the demo", Action::OpenDemo.tooltip()));
+            if empty::show(ui, "Nothing is open", "Drop a folder here", action) {
                 cx.act(Action::OpenDemo);
             }
         } else if empty::show(ui, "No pair matches the filter", "", Some(("Clear the filter", "Shows all pairs"))) {
@@ -268,14 +264,7 @@ fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, id: PairId, selected: bool) {
     });
     if ui.is_rect_visible(rect) {
         let painter = ui.painter_at(rect);
-        let fill = if selected {
-            p.selected
-        } else if response.hovered() {
-            p.control[0]
-        } else {
-            Color32::TRANSPARENT
-        };
-        painter.rect_filled(rect, 4.0, fill);
+        painter.rect_filled(rect, 4.0, p.row(selected, response.hovered()));
         if selected {
             let mark = Rect::from_min_size(rect.min, vec2(3.0, ROW));
             painter.rect_filled(mark, CornerRadius { nw: 4, sw: 4, ne: 0, se: 0 }, p.accent);
@@ -333,14 +322,10 @@ fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, id: PairId, selected: bool) {
 
 /// A sheet with lines: the pair has a note.
 fn note_mark(painter: &egui::Painter, center: egui::Pos2, color: Color32) {
-    painter.rect_stroke(
-        Rect::from_center_size(center, vec2(7.0, 8.0)),
-        1.0,
-        Stroke::new(1.0, color),
-        egui::StrokeKind::Inside,
-    );
+    let (sheet, stroke) = (Rect::from_center_size(center, vec2(7.0, 8.0)), Stroke::new(1.0, color));
+    painter.rect_stroke(sheet, 1.0, stroke, egui::StrokeKind::Inside);
     for y in [-1.0, 1.0] {
-        painter.hline(center.x - 2.0..=center.x + 2.0, center.y + y, Stroke::new(1.0, color));
+        painter.hline(center.x - 2.0..=center.x + 2.0, center.y + y, stroke);
     }
 }
 
@@ -361,9 +346,7 @@ fn thumbnail(cx: &mut Cx<'_>, ui: &Ui, id: PairId) -> Option<TextureId> {
     let range = super::images::range_of(cx.state);
     let bits = (range.lo.to_bits(), range.hi.to_bits());
     let map = super::images::map_of(cx.state);
-    let picture = cx
-        .shared
-        .textures
-        .get(ui.ctx(), ("thumbnail", key), (bits, map), false, || (depth_image(depth, map, range), None));
+    let make = || (depth_image(depth, map, range), None);
+    let picture = cx.shared.textures.get(ui.ctx(), ("thumbnail", key), (bits, map), false, make);
     Some(picture.texture.id())
 }

@@ -96,8 +96,9 @@ fn presets(cx: &Cx<'_>, ui: &mut Ui, new: &mut GenerateSettings) {
     let bundle = recipe::bundle(cx.state, BundleKind::Generator).ok();
     row(ui, cx.p.weak, "Preset", |ui| {
         for preset in Preset::iter() {
-            let button = ui.add(egui::Button::selectable(new.preset == Some(preset), preset_name(preset)));
-            if button.on_hover_text(preset_help(preset, bundle)).clicked() {
+            let (name, help) = preset_texts(preset, bundle);
+            let button = ui.add(egui::Button::selectable(new.preset == Some(preset), name));
+            if button.on_hover_text(help).clicked() {
                 *new = GenerateSettings { preset: Some(preset), ..new.clone() };
             }
         }
@@ -117,14 +118,9 @@ fn numbers(cx: &mut Cx<'_>, ui: &mut Ui, new: &mut GenerateSettings) {
         new.sampler = choose(ui, combo, name, Some(&new.sampler), Sampler::iter(), said).unwrap_or(new.sampler);
         ui.label(RichText::new("eta").color(cx.p.weak));
         let drag = egui::DragValue::new(&mut new.eta).speed(0.01).range(0.0..=1.0).fixed_decimals(2);
-        reset(
-            ui.add(drag).accessible_name("Eta"),
-            "Fresh noise that DDIM adds at each step, 0 to 1; 0 is deterministic",
-            "0.00",
-            || {
-                new.eta = GenerateSettings::default().eta;
-            },
-        );
+        let tip = "Fresh noise that DDIM adds at each step, 0 to 1; 0 is deterministic";
+        let eta = GenerateSettings::default().eta;
+        reset(ui.add(drag).accessible_name("Eta"), tip, "0.00", || new.eta = eta);
     });
     row(ui, cx.p.weak, "Steps", |ui| {
         let drag = egui::DragValue::new(&mut new.steps).speed(0.2).range(STEPS);
@@ -136,9 +132,8 @@ fn numbers(cx: &mut Cx<'_>, ui: &mut Ui, new: &mut GenerateSettings) {
     });
     row(ui, cx.p.weak, "Seed", |ui| {
         let drag = egui::DragValue::new(&mut new.seed).speed(1.0);
-        reset(ui.add(drag).accessible_name("Seed"), "The same seed gives the same prediction", "42", || {
-            new.seed = GenerateSettings::default().seed;
-        });
+        let (tip, seed) = ("The same seed gives the same prediction", GenerateSettings::default().seed);
+        reset(ui.add(drag).accessible_name("Seed"), tip, "42", || new.seed = seed);
         cx.action_button(ui, Action::GenerateNewSeed, "New");
     });
     row(ui, cx.p.weak, "Predict", |ui| {
@@ -186,29 +181,22 @@ fn run(cx: &mut Cx<'_>, ui: &mut Ui) {
     }
 }
 
-/// The name on screen.
-fn preset_name(preset: Preset) -> &'static str {
-    match preset {
-        Preset::Fast => "Fast",
-        Preset::Default => "Default",
-        Preset::Sharp => "Sharp",
-    }
-}
-
-/// Tooltip of a preset: what it does with this bundle.
-fn preset_help(preset: Preset, bundle: Option<&BundleInfo>) -> String {
-    let what = match preset {
-        Preset::Fast => "For browsing: close to the mean of all plausible imprints",
-        Preset::Default => "What the model recommends",
-        Preset::Sharp => "Sharpest: more steps would change nothing. Sharper is not always closer to the measurement",
+/// Name and tooltip of a preset: what it does with this bundle.
+fn preset_texts(preset: Preset, bundle: Option<&BundleInfo>) -> (&'static str, String) {
+    const SHARP: &str = "Sharpest: more steps would change nothing. Sharper is not always closer to the measurement";
+    let (name, what) = match preset {
+        Preset::Fast => ("Fast", "For browsing: close to the mean of all plausible imprints"),
+        Preset::Default => ("Default", "What the model recommends"),
+        Preset::Sharp => ("Sharp", SHARP),
     };
-    match bundle.and_then(|bundle| bundle.generator.as_ref()) {
+    let help = match bundle.and_then(|bundle| bundle.generator.as_ref()) {
         Some(g) => {
             let config = preset.config(g.defaults, g.training_steps);
             format!("{what}: {} with {} steps", sampler_name(config.sampler), config.steps)
         }
         None => what.to_owned(),
-    }
+    };
+    (name, help)
 }
 
 /// The name on screen.
@@ -277,22 +265,13 @@ fn results(cx: &mut Cx<'_>, ui: &mut Ui) {
     let shift = cx.state.settings.shift;
     for recipe in keys.iter().rev() {
         let selected = chosen.as_ref() == Some(recipe);
-        let psnr = cx
-            .state
-            .results
-            .comparisons
-            .get(&ComparisonKey::measured(recipe.clone(), shift))
-            .and_then(|c| c.psnr_db)
-            .map_or(String::new(), |v| format!("{v:.1} dB"));
-        let prediction = cx.state.results.predictions.get(recipe);
-        let seconds = prediction.map_or(String::new(), |p| match p.kept {
-            true => "kept".to_owned(),
-            false => format!("{:.1} s", p.seconds),
-        });
-        let took = prediction.map_or(String::new(), |p| match p.kept {
-            true => format!("Predicted earlier ({:.1} s), read from disk", p.seconds),
-            false => format!("Predicted in {:.2} s", p.seconds),
-        });
+        let compared = cx.state.results.comparisons.get(&ComparisonKey::measured(recipe.clone(), shift));
+        let psnr = compared.and_then(|c| c.psnr_db).map_or(String::new(), |v| format!("{v:.1} dB"));
+        let (seconds, took) = match cx.state.results.predictions.get(recipe) {
+            Some(p) if p.kept => ("kept".to_owned(), format!("Predicted earlier ({:.1} s), read from disk", p.seconds)),
+            Some(p) => (format!("{:.1} s", p.seconds), format!("Predicted in {:.2} s", p.seconds)),
+            None => (String::new(), String::new()),
+        };
         ui.horizontal_wrapped(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
             let text = format!("seed {}", recipe.config.seed);

@@ -202,11 +202,8 @@ pub(crate) fn placeholder<T: ?Sized>(
             if let Some(picture) = cx.shared.textures.last(slot) {
                 let gel = slot.0 == Pane::GelSlim;
                 let view = if gel { cx.shared.views.gel } else { cx.shared.views.bubble };
-                let turned = gel && cx.state.rig().turned();
-                let map = CanvasMap::new(rect, size, view, turned);
-                let [from, to] = if turned { [1.0, 0.0] } else { [0.0, 1.0] };
-                let uv = Rect::from_min_max(pos2(from, from), pos2(to, to));
-                ui.painter_at(rect).image(picture.texture.id(), map.image_rect, uv, Color32::from_gray(110));
+                let map = CanvasMap::new(rect, size, view, gel && cx.state.rig().turned());
+                ui.painter_at(rect).image(picture.texture.id(), map.image_rect, map.uv(), Color32::from_gray(110));
             }
             let font = FontId::proportional(12.0);
             ui.painter_at(rect).text(rect.center(), Align2::CENTER_CENTER, "Loading…", font, cx.p.weak);
@@ -444,7 +441,8 @@ fn depth_pane(
             Some(LabelsCommand::BeginStroke { finger, source, at_px, erase })
         });
     }
-    captions(cx, &output, finger);
+    output.caption(Align2::LEFT_BOTTOM, &source_note(cx.state), crate::ui::parts::theme::DARK.caution);
+    output.caption(Align2::LEFT_TOP, &finger_text(cx.state, finger), ON_IMAGE);
     histogram
 }
 
@@ -472,12 +470,6 @@ pub(crate) fn window(cx: &Cx<'_>, output: &CanvasOutput, finger: PadId) {
     if let Some(link) = Link::of(&cx.state.rig(), finger).filter(|_| cx.state.settings.footprint_visible) {
         output.dashed_rect(link.window, Color32::from_gray(235));
     }
-}
-
-fn captions(cx: &Cx<'_>, output: &CanvasOutput, finger: PadId) {
-    let text = finger_text(cx.state, finger);
-    output.caption(Align2::LEFT_BOTTOM, &source_note(cx.state), crate::ui::parts::theme::DARK.caution);
-    output.caption(Align2::LEFT_TOP, &text, ON_IMAGE);
 }
 
 /// The value under the pointer, in millimeters.

@@ -210,12 +210,7 @@ fn number(ui: &Ui, cell: Rect, text: &str, color: Color32) {
 fn row(cx: &Cx<'_>, ui: &mut Ui, label: &str, selected: bool, tip: &str) -> (Rect, bool) {
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::click());
     response.widget_info(|| WidgetInfo::selected(Role::Button, true, selected, label));
-    let fill = match (selected, response.hovered()) {
-        (true, _) => cx.p.selected,
-        (false, true) => cx.p.control[0],
-        (false, false) => Color32::TRANSPARENT,
-    };
-    ui.painter().rect_filled(rect, 3.0, fill);
+    ui.painter().rect_filled(rect, 3.0, cx.p.row(selected, response.hovered()));
     (rect, response.on_hover_text(tip).clicked())
 }
 

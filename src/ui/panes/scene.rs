@@ -307,19 +307,16 @@ fn aim(
 
 /// The point of a cloud that is meant by a position in the picture, physical pixels: finger and index.
 fn nearest(clouds: &Clouds, camera: &Camera, size: [u32; 2], pointer: glam::DVec2) -> Option<(PadId, usize)> {
-    let mut best: Option<(PadId, usize, f64, f64)> = None;
-    for (finger, cloud) in clouds.fingers.entries() {
-        let hit = nearest_point(&cloud.points, camera, size, pointer, PICK_PX);
-        if let Some(hit) = hit {
-            let better = best.is_none_or(|(_, _, px, depth)| {
-                hit.distance_px < px - 1.0 || (hit.distance_px < px + 1.0 && hit.depth_m < depth)
-            });
-            if better {
-                best = Some((finger, hit.index, hit.distance_px, hit.depth_m));
-            }
-        }
-    }
-    best.map(|(finger, index, _, _)| (finger, index))
+    let hits = clouds
+        .fingers
+        .entries()
+        .filter_map(|(finger, cloud)| Some((finger, nearest_point(&cloud.points, camera, size, pointer, PICK_PX)?)));
+    let best = hits.reduce(|best, next| {
+        let (old, new) = (best.1, next.1);
+        let nearer = new.distance_px < old.distance_px + 1.0 && new.depth_m < old.depth_m;
+        if nearer || new.distance_px < old.distance_px - 1.0 { next } else { best }
+    });
+    best.map(|(finger, hit)| (finger, hit.index))
 }
 
 /// The point under the pointer becomes the pixel under the pointer of all images.
@@ -345,10 +342,7 @@ fn point_at(cx: &mut Cx<'_>, ui: &Ui, memory: &Memory, source: ImprintSource, ou
         }
         return;
     };
-    let Some((point, pixel)) = clouds.finger(finger).and_then(|c| Some((*c.points.get(index)?, *c.pixels.get(index)?)))
-    else {
-        return;
-    };
+    let Some((point, pixel)) = point_of(clouds, finger, index) else { return };
     cx.shared.hover_claimed = true;
     let hover = Some(Hover { finger, at_px: [f32::from(pixel[0]), f32::from(pixel[1])] });
     if cx.state.selection.hover != hover {
@@ -358,13 +352,15 @@ fn point_at(cx: &mut Cx<'_>, ui: &Ui, memory: &Memory, source: ImprintSource, ou
     say(cx, source, finger, index, clouds);
 }
 
+/// A point of a cloud and its pixel.
+fn point_of(clouds: &Clouds, finger: PadId, index: usize) -> Option<(DVec3, [u16; 2])> {
+    let cloud = clouds.finger(finger)?;
+    Some((*cloud.points.get(index)?, *cloud.pixels.get(index)?))
+}
+
 /// Puts the figures of a point into the status bar.
 fn say(cx: &mut Cx<'_>, source: ImprintSource, finger: PadId, index: usize, clouds: &Clouds) {
-    let cloud = clouds.finger(finger);
-    let Some((point, pixel)) = cloud.and_then(|cloud| Some((*cloud.points.get(index)?, *cloud.pixels.get(index)?)))
-    else {
-        return;
-    };
+    let Some((point, pixel)) = point_of(clouds, finger, index) else { return };
     let off = distance_at(cx, source, finger, index, clouds);
     let off = off.map_or(String::new(), |off| format!("   {} from the model", units::text_mm(off)));
     cx.shared.readout = Some(format!(

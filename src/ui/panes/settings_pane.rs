@@ -81,7 +81,7 @@ fn body(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.label(section("Labels", cx.p));
     person(cx, ui);
     if let Ok(device) = cx.device {
-        ui.label(caption(format!("Graphics: {}", device.adapter()), cx.p));
+        ui.label(caption(format!("Graphics: {}", device.gpu.adapter), cx.p));
     }
     ui.add_space(4.0);
     cx.action_button(ui, Action::ResetWorkspace, "Reset workspace");

@@ -64,14 +64,11 @@ impl Cx<'_> {
         button: egui::Button<'_>,
         name: impl Into<String>,
     ) -> Response {
-        let command = action.command(self.state);
-        let response = ui.add_enabled(command.is_some(), button).accessible_name(name);
+        let response = ui.add_enabled(action.command(self.state).is_some(), button).accessible_name(name);
         let help = action.help();
         let response = response.on_hover_text(&help).on_disabled_hover_text(help);
-        if response.clicked()
-            && let Some(command) = command
-        {
-            self.out.push(command);
+        if response.clicked() {
+            self.act(action);
         }
         response
     }

@@ -61,7 +61,8 @@ struct Answer {
 pub(crate) struct Dialogs {
     sender: Sender<Answer>,
     answers: Receiver<Answer>,
-    waiting: bool,
+    /// True where the system's dialog is open, or is about to be.
+    pub waiting: bool,
     path_box: Option<PathBox>,
     /// True where the system's dialogs are tried at all.
     native: bool,
@@ -106,11 +107,6 @@ impl Dialogs {
             self.waiting = false;
             self.type_path(purpose, "No file dialog could be started: type or paste a path.");
         }
-    }
-
-    /// True where the system's dialog is open, or is about to be.
-    pub(crate) fn is_waiting(&self) -> bool {
-        self.waiting
     }
 
     /// True where the path box is open.

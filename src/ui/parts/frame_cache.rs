@@ -39,7 +39,7 @@ pub(crate) struct FrameCache {
     /// Of each tile the hash of all triangles that touch it.
     tiles: Vec<u64>,
     /// Pixels painted so far.
-    painted: u64,
+    pub painted: u64,
 }
 
 /// A triangle of a primitive.
@@ -107,11 +107,6 @@ impl FrameCache {
         *self.versions.entry(texture).or_default() += 1;
     }
 
-    /// Pixels painted so far.
-    pub(crate) fn painted(&self) -> u64 {
-        self.painted
-    }
-
     /// Sends new and changed textures to the device.
     fn take_textures(&mut self, output: &mut FullOutput) {
         let mut set: Vec<_> = output.textures_delta.set.drain().collect();
@@ -143,7 +138,7 @@ impl FrameCache {
     /// The picture of this size; a new one, and every tile to be painted, if there is none.
     fn picture(&mut self, size: [u32; 2]) -> Arc<FramePicture> {
         match &self.picture {
-            Some(picture) if picture.size() == size => picture.clone(),
+            Some(picture) if picture.size == size => picture.clone(),
             _ => {
                 self.tiles.clear();
                 let picture = Arc::new(self.raster.picture(&self.gpu, size, self.format));

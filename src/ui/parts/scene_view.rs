@@ -17,7 +17,7 @@ use crate::gpu::{Gpu, GpuError, wgpu};
 
 /// The graphics device as all 3D panes share it.
 pub(crate) struct Device {
-    gpu: Gpu,
+    pub gpu: Gpu,
     pipelines: Arc<Pipelines>,
     state: RenderState,
 }
@@ -31,11 +31,6 @@ impl Device {
         let gpu = Gpu::new(&state.adapter, state.device.clone(), state.queue.clone());
         let pipelines = Arc::new(Pipelines::new(&gpu)?);
         Ok(Self { gpu, pipelines, state: state.clone() })
-    }
-
-    /// Name and driver of the adapter.
-    pub(crate) fn adapter(&self) -> &str {
-        &self.gpu.adapter
     }
 }
 
@@ -59,7 +54,6 @@ struct Drawn {
     target: Target,
     renderer: SceneRenderer,
     texture: TextureId,
-    generation: u64,
 }
 
 /// Use of the pointer's buttons besides the camera.
@@ -175,13 +169,10 @@ impl SceneView {
                     target.view(),
                     wgpu::FilterMode::Linear,
                 );
-                let generation = target.generation();
-                self.drawn.insert(Drawn { target, renderer, texture, generation })
+                self.drawn.insert(Drawn { target, renderer, texture })
             }
         };
-        drawn.target.resize(gpu, size)?;
-        if drawn.target.generation() != drawn.generation {
-            drawn.generation = drawn.target.generation();
+        if drawn.target.resize(gpu, size)? {
             device.state.renderer.write().update_egui_texture_from_wgpu_texture(
                 &gpu.device,
                 drawn.target.view(),
@@ -207,13 +198,9 @@ impl SceneView {
         if self.error.as_ref() != Some(&text) {
             log::error!("3D view: {text}");
         }
-        ui.painter().text(
-            output.rect.center(),
-            egui::Align2::CENTER_CENTER,
-            format!("This view cannot be drawn.\n{text}"),
-            egui::FontId::proportional(12.0),
-            ui.visuals().error_fg_color,
-        );
+        let (said, font) = (format!("This view cannot be drawn.\n{text}"), egui::FontId::proportional(12.0));
+        let (middle, color) = (output.rect.center(), ui.visuals().error_fg_color);
+        ui.painter().text(middle, egui::Align2::CENTER_CENTER, said, font, color);
         self.error = Some(text);
     }
 }

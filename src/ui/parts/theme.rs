@@ -118,6 +118,15 @@ impl Palette {
     pub fn of(ui: &egui::Ui) -> &'static Self {
         if ui.visuals().dark_mode { &DARK } else { &LIGHT }
     }
+
+    /// Ground of a row in a list.
+    pub(crate) fn row(&self, selected: bool, hovered: bool) -> Color32 {
+        match (selected, hovered) {
+            (true, _) => self.selected,
+            (false, true) => self.control[0],
+            (false, false) => Color32::TRANSPARENT,
+        }
+    }
 }
 
 /// The family of half-bold type, for titles.

@@ -88,7 +88,6 @@ pub struct StudioApp {
     shortcuts: shortcuts::Memory,
     trees: BTreeMap<Workspace, Tree<Pane>>,
     device: Result<Device, String>,
-    inline: bool,
     first_prediction: bool,
     /// True once cameras and the large pane of the last run were looked for.
     resumed: bool,
@@ -158,7 +157,6 @@ impl StudioApp {
             shortcuts: shortcuts::Memory::default(),
             trees: BTreeMap::new(),
             device,
-            inline: options.inline,
             first_prediction: false,
             resumed: false,
             applied_theme: None,
@@ -198,7 +196,7 @@ impl StudioApp {
 
     /// Pixels of the window painted so far, where only what changed is painted. For tests.
     pub fn painted(&self, ctx: &egui::Context) -> Option<u64> {
-        ctx.with_plugin(|cache: &mut FrameCache| cache.painted())
+        ctx.with_plugin(|cache: &mut FrameCache| cache.painted)
     }
 
     /// True where nothing runs, nothing waits and nothing is to be executed.
@@ -457,11 +455,8 @@ impl eframe::App for StudioApp {
             self.lift_pen();
             self.panes.memories.browser.scrolled_to = None;
         }
-        if self.inline {
-            let more = crate::app::jobs::Worker::iter().any(|worker| self.runtime.run_one(worker));
-            if more {
-                ctx.request_repaint();
-            }
+        if crate::app::jobs::Worker::iter().any(|worker| self.runtime.run_one(worker)) {
+            ctx.request_repaint();
         }
         for request in requests {
             self.perform(ctx, request);
@@ -523,7 +518,7 @@ impl eframe::App for StudioApp {
             let export = &state.export;
             let place = shortcuts::Place {
                 covered,
-                dialog: export.asking_masks || export.importing.is_some() || cx.shared.dialogs.is_waiting(),
+                dialog: export.asking_masks || export.importing.is_some() || cx.shared.dialogs.waiting,
                 labeling: state.is_labeling(),
             };
             let possible = |action: Action| action.command(state).is_some() && shortcuts::fits_pane(action, over);

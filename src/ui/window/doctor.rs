@@ -14,7 +14,7 @@ use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{Palette, SMALL, caption};
 use touch2touch_core::findings::Finding;
 use touch2touch_core::units::counted;
-use touch2touch_pipeline::doctor::{Cure, Examined, Fact, Grade, SAMPLE, Worth};
+use touch2touch_pipeline::doctor::{Cure, Examined, Fact, Grade, SAMPLE};
 
 /// Width of the panel, points.
 const WIDE: f32 = 520.0;
@@ -166,7 +166,6 @@ fn tried(cx: &mut Cx<'_>, ui: &mut Ui) {
     }
     match state.doctor.worth.clone() {
         Some(worth) => {
-            let worth: &Worth = &worth;
             worth.facts().iter().for_each(|fact| line(cx, ui, fact));
             if let Some(name) = doctor::fitted_in_use(cx.state) {
                 let text = format!("in use: {name}; these numbers are of the model it was fitted from");
@@ -175,16 +174,13 @@ fn tried(cx: &mut Cx<'_>, ui: &mut Ui) {
                 });
             }
         }
-        None if doctor::can_try(state) => {}
-        None => return,
-    }
-    if state.doctor.worth.is_none() {
-        named(cx, ui, "Models", |cx, ui| {
+        None if doctor::can_try(state) => named(cx, ui, "Models", |cx, ui| {
             let tip = format!("Predicts {SAMPLE} pairs spread over the data set and tries a fit; writes nothing");
             if ui.small_button("Try the models").on_hover_text(tip).clicked() {
                 cx.push(DoctorCommand::Try);
             }
-        });
+        }),
+        None => {}
     }
 }
 

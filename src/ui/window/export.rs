@@ -12,7 +12,8 @@ use crate::app::results;
 use crate::app::state::Lookup;
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::caption;
-use touch2touch_pipeline::export::{ExportChoice, Which};
+use touch2touch_pipeline::export::import::Import;
+use touch2touch_pipeline::export::{ExportChoice, Plan, Which};
 use touch2touch_pipeline::io::exchange::Format;
 use touch2touch_pipeline::still::WIDTH_PX;
 use touch2touch_pipeline::still::space::Ground;
@@ -119,30 +120,39 @@ pub(crate) fn import_form(cx: &mut Cx<'_>, ctx: &egui::Context) {
     }
 }
 
+/// What would be done, line by line, or that it is `nothing`; true where there is something to do.
+fn plan<T>(
+    cx: &Cx<'_>,
+    ui: &mut Ui,
+    found: Lookup<'_, T>,
+    said: impl FnOnce(&T) -> (Vec<String>, bool),
+    [nothing, waiting]: [RichText; 2],
+) -> bool {
+    let mut line = |text: RichText| _ = ui.add(egui::Label::new(text).wrap());
+    match found {
+        Lookup::Ready(plan) | Lookup::Stale(plan) => {
+            let (lines, some) = said(plan);
+            lines.into_iter().for_each(|text| line(RichText::new(text).size(12.0).color(cx.p.text)));
+            if !some {
+                line(nothing.size(12.0).color(cx.p.caution));
+            }
+            return some;
+        }
+        Lookup::Failed(err) => line(RichText::new(err.to_string()).size(12.0).color(cx.p.wrong)),
+        Lookup::Waiting | Lookup::Absent(_) => line(waiting.color(cx.p.weak)),
+    }
+    false
+}
+
 /// Changes that the import would make; true where there are any.
 fn import_plan(cx: &Cx<'_>, ui: &mut Ui) -> bool {
     let Some(key) = results::import_plan_key(cx.state) else { return false };
-    let mut line = |text: String, color| {
-        ui.add(egui::Label::new(RichText::new(text).size(12.0).color(color)).wrap());
+    let said = |plan: &Import| {
+        let format = format!("Format: {}", plan.format.name());
+        (std::iter::once(format).chain(plan.lines()).collect(), plan.total() > 0)
     };
-    match cx.state.look(key) {
-        Lookup::Ready(plan) | Lookup::Stale(plan) => {
-            line(format!("Format: {}", plan.format.name()), cx.p.text);
-            plan.lines().into_iter().for_each(|text| line(text, cx.p.text));
-            if plan.total() == 0 {
-                line("Nothing would change.".into(), cx.p.caution);
-            }
-            plan.total() > 0
-        }
-        Lookup::Failed(err) => {
-            line(err.to_string(), cx.p.wrong);
-            false
-        }
-        Lookup::Waiting | Lookup::Absent(_) => {
-            line("Reading the masks…".into(), cx.p.weak);
-            false
-        }
-    }
+    let texts = [RichText::new("Nothing would change."), RichText::new("Reading the masks…").size(12.0)];
+    plan(cx, ui, cx.state.look(key).value(), said, texts)
 }
 
 /// The form of an export of masks, where it is open: what goes where is said before anything is written.
@@ -208,24 +218,7 @@ fn mask_choices(cx: &Cx<'_>, ui: &mut Ui, choice: &mut ExportChoice) {
 /// Division of the export; true where there is something to write.
 fn mask_plan(cx: &Cx<'_>, ui: &mut Ui) -> bool {
     let Some(key) = results::mask_plan_key(cx.state) else { return false };
-    match cx.state.look(key) {
-        Lookup::Ready(plan) | Lookup::Stale(plan) => {
-            for line in plan.lines() {
-                ui.add(egui::Label::new(RichText::new(line).size(12.0).color(cx.p.text)).wrap());
-            }
-            if plan.total() == 0 {
-                let what = Action::DoneAndNext.behind("Nothing to write yet: edit a mask and mark its pair done");
-                ui.label(RichText::new(what).size(12.0).color(cx.p.caution));
-            }
-            plan.total() > 0
-        }
-        Lookup::Failed(err) => {
-            ui.label(RichText::new(err.to_string()).size(12.0).color(cx.p.wrong));
-            false
-        }
-        Lookup::Waiting | Lookup::Absent(_) => {
-            ui.label(caption("…", cx.p));
-            false
-        }
-    }
+    let nothing = Action::DoneAndNext.behind("Nothing to write yet: edit a mask and mark its pair done");
+    let said = |plan: &Plan| (plan.lines(), plan.total() > 0);
+    plan(cx, ui, cx.state.look(key).value(), said, [RichText::new(nothing), caption("…", cx.p)])
 }

@@ -144,36 +144,24 @@ fn search(cx: &Cx<'_>, memory: &mut Memory) {
 fn entry_ui(cx: &Cx<'_>, ui: &mut Ui, entry: &Entry, selected: bool) -> egui::Response {
     let p = cx.p;
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::click());
-    let (name, kind, enabled) = match entry {
-        Entry::Action(action) => {
-            let keys = action.key_text();
-            (action.name(), keys, action.command(cx.state).is_some())
-        }
-        Entry::Workspace(workspace) => (workspace.name(), "workspace".to_owned(), true),
-        Entry::Pane(pane) => (pane.title(), "pane".to_owned(), true),
-        Entry::Pair(_, name) => (name.as_str(), "pair".to_owned(), true),
-        Entry::Tool(tool) => (tool.as_str(), "tool".to_owned(), true),
+    let (name, kind, tip) = match entry {
+        Entry::Action(action) => (action.name(), action.key_text(), action.tooltip()),
+        Entry::Workspace(workspace) => (workspace.name(), "workspace".to_owned(), workspace.tooltip()),
+        Entry::Pane(pane) => (pane.title(), "pane".to_owned(), pane.tip()),
+        Entry::Pair(_, name) => (name.as_str(), "pair".to_owned(), ""),
+        Entry::Tool(tool) => (tool.as_str(), "tool".to_owned(), ""),
     };
+    let enabled = !matches!(entry, Entry::Action(action) if action.command(cx.state).is_none());
     response.widget_info(|| WidgetInfo::labeled(Role::Button, enabled, name));
     if ui.is_rect_visible(rect) {
-        if selected {
-            ui.painter().rect_filled(rect, 4.0, p.selected);
-        } else if response.hovered() {
-            ui.painter().rect_filled(rect, 4.0, p.control[0]);
-        }
+        ui.painter().rect_filled(rect, 4.0, p.row(selected, response.hovered()));
         let color = if enabled { p.strong } else { p.weak };
         let y = rect.center().y;
         let place =
             ui.painter().text(pos2(rect.left() + 8.0, y), Align2::LEFT_CENTER, name, FontId::proportional(13.0), color);
-        let tip = match entry {
-            Entry::Action(action) => Some(action.tooltip()),
-            Entry::Workspace(workspace) => Some(workspace.tooltip()),
-            Entry::Pane(pane) => Some(pane.tip()),
-            Entry::Pair(..) | Entry::Tool(_) => None,
-        };
         let small = FontId::proportional(SMALL);
         let right = ui.painter().text(pos2(rect.right() - 8.0, y), Align2::RIGHT_CENTER, kind, small.clone(), p.weak);
-        if let Some(tip) = tip {
+        if !tip.is_empty() {
             let left = place.right() + 12.0;
             let mut job = LayoutJob::simple_singleline(tip.to_owned(), small, p.weak);
             job.wrap = TextWrapping::truncate_at_width((right.left() - 12.0 - left).max(0.0));

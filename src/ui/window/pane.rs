@@ -143,10 +143,8 @@ fn menu(cx: &mut Cx<'_>, ui: &mut Ui, maximized: &mut Option<Pane>, pane: Pane) 
     let text = if whole { "Back to all panes" } else { "Fill the window" };
     let fill = egui::Button::new(text).shortcut_text(Action::MaximizePane.key_text());
     let fill = ui.add(fill).accessible_name(format!("{text}: {}", pane.title()));
-    if fill
-        .on_hover_text("Makes this pane fill the window or shows all again; so does a double-click on its tab")
-        .clicked()
-    {
+    let tip = "Makes this pane fill the window or shows all again; so does a double-click on its tab";
+    if fill.on_hover_text(tip).clicked() {
         *maximized = if whole { None } else { Some(pane) };
         ui.close();
     }
@@ -280,11 +278,8 @@ pub(crate) fn show_maximized(cx: &mut Cx<'_>, ui: &mut Ui, panes: &mut Panes, pa
         ui.horizontal_centered(|ui| {
             ui.label(crate::ui::parts::theme::title(pane.title()));
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                if ui
-                    .button(RichText::new("Back to all panes").size(SMALL))
-                    .on_hover_text(with_keys("[[maximize_pane]] or [[cancel_jobs]]"))
-                    .clicked()
-                {
+                let back = ui.button(RichText::new("Back to all panes").size(SMALL));
+                if back.on_hover_text(with_keys("[[maximize_pane]] or [[cancel_jobs]]")).clicked() {
                     panes.maximized = None;
                 }
                 menu_button(cx, ui, &mut panes.maximized, pane);

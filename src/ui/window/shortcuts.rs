@@ -106,12 +106,10 @@ pub(crate) fn nudges(ctx: &egui::Context, place: Place) -> Vec<(PoseAxis, f64)> 
                 (Key::ArrowDown, false) => (PoseAxis::Z, 1.0),
                 _ => return true,
             };
-            let steps = if fine {
-                0.1
-            } else if held.shift {
-                10.0
-            } else {
-                1.0
+            let steps = match (fine, held.shift) {
+                (true, _) => 0.1,
+                (false, true) => 10.0,
+                (false, false) => 1.0,
             };
             asked.push((axis, sign * steps));
             false

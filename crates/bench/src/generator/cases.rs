@@ -106,7 +106,7 @@ impl Judge {
         case: &Case,
         (source, imprints): (ImprintSource, &[DepthMap; 2]),
     ) -> anyhow::Result<Option<f64>> {
-        let mut contact = |imprint| Ok::<_, anyhow::Error>(Some((*self.masks.contact(imprint, None)?.mask).clone()));
+        let mut contact = |imprint| Ok::<_, anyhow::Error>(Some((*self.masks.contact(imprint)?.mask).clone()));
         let masks: PerPad<Mask> = [contact(&imprints[0])?, contact(&imprints[1])?].into();
         let imprints = [Some(&imprints[0]), Some(&imprints[1])].into();
         let points = contact_points(&case.sample, &imprints, &masks.as_ref())?;

@@ -210,31 +210,36 @@ impl DistanceField {
     /// The part of the cloud that may come to lie outside the silhouette while no point moves farther than `margin`
     /// (meters) from where `state` puts it. The other points rest.
     pub(super) fn restless(&self, cloud: &Cloud, state: State, margin: f64) -> Cloud {
-        let motion = Motion::new(self, state);
         let margin = -margin as f32;
-        let mut kept = Cloud {
-            y: Vec::with_capacity(cloud.y.len()),
-            z: Vec::with_capacity(cloud.y.len()),
-            len: 0,
-            resting: cloud.resting,
-        };
+        let mut kept = Cloud::default();
+        self.keep(cloud, state, &mut kept, |r, _, _| r > margin);
+        kept
+    }
+
+    /// The points of which `keeps` holds, by their distance and their place about the centroid; the others rest. `into` is
+    /// overwritten.
+    fn keep(&self, cloud: &Cloud, state: State, into: &mut Cloud, keeps: impl Fn(f32, f32, f32) -> bool) {
+        let motion = Motion::new(self, state);
+        for list in [&mut into.y, &mut into.z] {
+            list.clear();
+            list.reserve(cloud.y.len());
+        }
         let mut left = cloud.len;
         for (y, z) in cloud.chunks() {
-            let read = self.read(&motion, y, z);
+            let r = self.read(&motion, y, z).r;
             for l in 0..LANES.min(left) {
-                if read.r[l] > margin {
-                    kept.y.push(y[l]);
-                    kept.z.push(z[l]);
+                if keeps(r[l], y[l], z[l]) {
+                    into.y.push(y[l]);
+                    into.z.push(z[l]);
                 }
             }
             left = left.saturating_sub(LANES);
         }
-        kept.len = kept.y.len();
-        kept.resting += cloud.len - kept.len;
-        let padded = kept.len.next_multiple_of(LANES);
-        kept.y.resize(padded, 0.0);
-        kept.z.resize(padded, 0.0);
-        kept
+        into.len = into.y.len();
+        into.resting = cloud.resting + cloud.len - into.len;
+        let padded = into.len.next_multiple_of(LANES);
+        into.y.resize(padded, 0.0);
+        into.z.resize(padded, 0.0);
     }
 
     /// Moments of the slopes of all points up to `reach` (meters) outside the silhouette.
@@ -368,26 +373,8 @@ impl DistanceField {
     /// The part of the cloud that may lie outside the silhouette somewhere in a box of states as in
     /// [`Self::bound`]; `into` is overwritten. The others cost nothing anywhere in it.
     pub(super) fn undecided(&self, cloud: &Cloud, state: State, extent: Extent, into: &mut Cloud) {
-        let motion = Motion::new(self, state);
         let (shift, turn) = ((extent.shift / CELL_M) as f32, extent.turn as f32);
-        into.y.clear();
-        into.z.clear();
-        let mut left = cloud.len;
-        for (y, z) in cloud.chunks() {
-            let r = self.read(&motion, y, z).r;
-            for l in 0..LANES.min(left) {
-                if r[l] + widened(shift + turn * (y[l] * y[l] + z[l] * z[l]).sqrt()) > 0.0 {
-                    into.y.push(y[l]);
-                    into.z.push(z[l]);
-                }
-            }
-            left = left.saturating_sub(LANES);
-        }
-        into.len = into.y.len();
-        into.resting = cloud.resting + cloud.len - into.len;
-        let padded = into.len.next_multiple_of(LANES);
-        into.y.resize(padded, 0.0);
-        into.z.resize(padded, 0.0);
+        self.keep(cloud, state, into, |r, y, z| r + widened(shift + turn * (y * y + z * z).sqrt()) > 0.0);
     }
 
     /// Reads the field for a step of points.

@@ -5,6 +5,7 @@
 
 use glam::DVec2;
 
+use super::LabModel;
 use crate::field::DistanceField;
 use crate::frames::PlanarPose;
 use crate::mesh::sampling::spread;
@@ -14,8 +15,8 @@ use crate::mesh::sampling::spread;
 pub enum Surface<'a> {
     /// The nearest point of the silhouette; points on the silhouette are where they should be.
     Silhouette(&'a DistanceField),
-    /// The nearest of some model points, inside or not.
-    Points(&'a ModelPoints),
+    /// The nearest point of a model that has some, inside or not.
+    Points(&'a LabModel),
 }
 
 /// One contact point and its counterpart.
@@ -74,7 +75,7 @@ pub fn correspondences(
             let (foot, residual_m) = match surface {
                 Surface::Silhouette(field) => foot_on_silhouette(field, in_object),
                 Surface::Points(points) => {
-                    let foot = points.nearest(in_object).unwrap_or(in_object);
+                    let foot = points.point(points.nearest(in_object).0);
                     (foot, foot.distance(in_object))
                 }
             };
@@ -100,51 +101,11 @@ fn foot_on_silhouette(field: &DistanceField, at: DVec2) -> (DVec2, f64) {
     (foot, residual)
 }
 
-/// Model points of which the nearest can be asked for: sorted along y.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct ModelPoints(Vec<DVec2>);
-
-impl ModelPoints {
-    /// From `(y, z)` in the object frame, meters; points that are not finite are left out.
-    pub fn new(points_yz: &[DVec2]) -> Self {
-        let mut points: Vec<DVec2> = points_yz.iter().copied().filter(|p| p.is_finite()).collect();
-        points.sort_by(|a, b| a.x.total_cmp(&b.x));
-        Self(points)
-    }
-
-    /// The nearest point; `None` without points or for a place that is not finite.
-    pub fn nearest(&self, at: DVec2) -> Option<DVec2> {
-        if !at.is_finite() {
-            return None;
-        }
-        let start = self.0.partition_point(|p| p.x < at.x);
-        let mut best: Option<(f64, DVec2)> = None;
-        let mut keep = |p: DVec2| {
-            let squared = p.distance_squared(at);
-            if best.is_none_or(|(least, _)| squared < least) {
-                best = Some((squared, p));
-            }
-            // Farther along y than the best is away: nothing beyond can be nearer.
-            best.is_some_and(|(least, _)| (p.x - at.x).powi(2) <= least)
-        };
-        for p in &self.0[start..] {
-            if !keep(*p) {
-                break;
-            }
-        }
-        for p in self.0[..start].iter().rev() {
-            if !keep(*p) {
-                break;
-            }
-        }
-        best.map(|(_, p)| p)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::align::testing::{cross, cross_contacts};
+    use glam::DVec3;
 
     const POSE: PlanarPose = PlanarPose { theta_rad: 0.2, y_m: 0.003, z_m: -0.001 };
 
@@ -174,13 +135,17 @@ mod tests {
         assert!(median < 2e-3 && max == far.residual_m);
     }
 
+    fn model_of(points_yz: &[DVec2]) -> LabModel {
+        LabModel::new(&points_yz.iter().map(|p| DVec3::new(0.0, p.x, p.y)).collect::<Vec<_>>())
+    }
+
     #[test]
     fn the_nearest_model_point_is_the_nearest() {
         let model = cross_contacts(300, PlanarPose::default(), 0.0, 5);
-        let points = ModelPoints::new(&model);
+        let points = model_of(&model);
         for at in cross_contacts(200, POSE, 5e-3, 6) {
             let brute = model.iter().map(|p| p.distance_squared(at)).fold(f64::INFINITY, f64::min);
-            assert_eq!(points.nearest(at).unwrap().distance_squared(at), brute);
+            assert_eq!(points.point(points.nearest(at).0).distance_squared(at), brute);
         }
         let matches = correspondences(&model, Surface::Points(&points), PlanarPose::default(), f64::INFINITY, 10);
         assert!(matches.list.iter().all(|m| m.residual_m == 0.0 && m.weight == 1.0));
@@ -188,8 +153,7 @@ mod tests {
 
     #[test]
     fn nothing_gives_nothing() {
-        let none = ModelPoints::new(&[DVec2::NAN]);
-        assert_eq!(none.nearest(DVec2::ZERO), None);
+        let none = model_of(&[DVec2::NAN]);
         let at = |points: &[DVec2], pose| correspondences(points, Surface::Points(&none), pose, 1e-3, 10);
         assert_eq!(at(&[], POSE), Matches::default());
         assert_eq!(at(&[], POSE).median_and_max_m(), None);

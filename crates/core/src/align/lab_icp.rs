@@ -23,31 +23,20 @@ const ITERATIONS: usize = 200;
 /// Distance below which a contact counts as an inlier in the report, meters; the loop itself does not use it.
 const INLIER_M: f64 = 1e-3;
 
-/// Settings of [`lab_icp()`]; the default is what the lab evaluates with.
-#[derive(Clone, Debug, PartialEq)]
-pub struct LabIcpConfig {
-    /// Poses to start from, `grasp_from_object`; the lab uses the identity. Not empty. The end with the least cost wins.
-    pub starts: Vec<PlanarPose>,
-    /// Keep per-iteration states and per-point residuals.
-    pub record: bool,
-}
+/// [`lab_icp()`] as a registration. It starts at the identity, as the lab does, where no other start is asked for.
+#[derive(Clone, Copy, Debug)]
+pub struct LabIcp;
 
-impl Default for LabIcpConfig {
-    fn default() -> Self {
-        Self { starts: vec![PlanarPose::default()], record: false }
-    }
-}
-
-impl Register for LabIcpConfig {
+impl Register for LabIcp {
     fn run(&self, scene: &Scene<'_>, tool: &ToolModel, ask: Ask<'_>) -> Result<AlignReport, AlignError> {
-        let starts = ask.starts.map_or_else(|| self.starts.clone(), <[_]>::to_vec);
-        let config = Self { starts, record: ask.record };
+        let identity = [PlanarPose::default()];
+        let starts = ask.starts.unwrap_or(&identity);
         let finite = scene.yz().iter().copied().filter(|p| p.is_finite());
         // The loop pulls the model to whatever there is, so that its end no longer shows that there was nothing.
         if finite.clone().count() >= LAB_MIN_POINTS {
-            check_overlap(finite, &tool.field, &config.starts)?;
+            check_overlap(finite, &tool.field, starts)?;
         }
-        let mut report = lab_icp(scene.points(), &LabModel::of(tool), &config)?;
+        let mut report = lab_icp(scene.points(), &LabModel::of(tool), starts, ask.record)?;
         report.observability = Some(observability(scene.yz(), &tool.field, report.grasp_from_object));
         Ok(report)
     }
@@ -55,12 +44,19 @@ impl Register for LabIcpConfig {
 
 /// Aligns model points (object frame) to contact points (grasp frame), meters.
 ///
-/// Points that are not finite are dropped and counted. The reported cost is the mean squared distance in the plane.
+/// `starts` are poses to start from, `grasp_from_object`, at least one; the end with the least cost wins. `record` keeps
+/// per-iteration states and per-point residuals. Points that are not finite are dropped and counted. The reported cost is
+/// the mean squared distance in the plane.
 ///
 /// # Errors
 /// [`AlignError`] for fewer than four contact or model points, coincident contacts, or a start that is not finite.
-pub fn lab_icp(points: &[DVec3], model: &LabModel, config: &LabIcpConfig) -> Result<AlignReport, AlignError> {
-    if config.starts.is_empty() || config.starts.iter().any(|s| !s.is_finite()) {
+pub fn lab_icp(
+    points: &[DVec3],
+    model: &LabModel,
+    starts: &[PlanarPose],
+    record: bool,
+) -> Result<AlignReport, AlignError> {
+    if starts.is_empty() || starts.iter().any(|s| !s.is_finite()) {
         return Err(AlignError::Config { what: "starts" });
     }
     let scene = Scene::new(points);
@@ -70,8 +66,8 @@ pub fn lab_icp(points: &[DVec3], model: &LabModel, config: &LabIcpConfig) -> Res
     }
     let (count, centroid) = (clean.points.len(), clean.centroid);
     let scene = &*clean.points;
-    let mut paper = Loop { config, model, scene, centroid, nearest: vec![0; count], lookups: 0, trace: Vec::new() };
-    let ends: Vec<End> = (0..config.starts.len()).map(|run| paper.run(run)).collect();
+    let mut paper = Loop { record, model, scene, centroid, nearest: vec![0; count], lookups: 0, trace: Vec::new() };
+    let ends: Vec<End> = starts.iter().enumerate().map(|(run, start)| paper.run(run, *start)).collect();
     let cost = |&end: &usize| ends[end].run.cost_m2;
     let winner = (0..ends.len()).min_by(|a, b| cost(a).total_cmp(&cost(b))).unwrap_or(0);
     let End { run, matched } = ends[winner];
@@ -83,7 +79,7 @@ pub fn lab_icp(points: &[DVec3], model: &LabModel, config: &LabIcpConfig) -> Res
         not_finite: clean.not_finite,
         within_prior: Prior::default().allows(run.end),
         trace: paper.trace,
-        fits: if config.record { fits(model, points, run.end) } else { Vec::new() },
+        fits: if record { fits(model, points, run.end) } else { Vec::new() },
         ..AlignReport::of(runs, winner, Rung::Fixed, count, inliers)
     })
 }
@@ -113,7 +109,7 @@ impl Matched {
 }
 
 struct Loop<'a> {
-    config: &'a LabIcpConfig,
+    record: bool,
     model: &'a LabModel,
     scene: &'a [DVec2],
     centroid: DVec2,
@@ -124,8 +120,7 @@ struct Loop<'a> {
 
 impl Loop<'_> {
     /// The iterations from one of the starts.
-    fn run(&mut self, run: usize) -> End {
-        let start = self.config.starts[run];
+    fn run(&mut self, run: usize, start: PlanarPose) -> End {
         let mut matcher = Matcher::new(self.scene.len());
         let mut stop = Stop::IterationLimit;
         let mut iterations = 0;
@@ -164,7 +159,7 @@ impl Loop<'_> {
     }
 
     fn note(&mut self, run: usize, iteration: usize, grasp_from_object: PlanarPose, matched: &Matched) {
-        if self.config.record {
+        if self.record {
             let points = self.scene.len();
             self.trace.push(TraceStep {
                 run,

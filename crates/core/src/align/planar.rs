@@ -54,7 +54,8 @@ pub fn align(points_yz: &[DVec2], field: &DistanceField, config: &AlignConfig) -
     }
     let problem = Problem::new(points_yz, field, config)?;
     if !config.starts.is_empty() {
-        let answer = problem.fixed(&config.starts)?;
+        let starts = config.starts.clone();
+        let answer = problem.descend(Rung::Fixed, starts, problem.search(), None, &config.kernels_m)?;
         return Ok(problem.report(points_yz, answer, Vec::new()));
     }
     let mut ladder = Vec::with_capacity(config.rungs.len());
@@ -178,16 +179,16 @@ impl<'a> Problem<'a> {
 
     /// The answer of a rung; `earlier` is where the one before ended.
     fn climb(&self, rung: Rung, earlier: Option<&Earlier>) -> Result<Answer, AlignError> {
-        let prior = &self.config.prior;
+        let AlignConfig { prior, kernels_m, .. } = self.config;
         match rung {
             Rung::Fixed | Rung::Around => Err(AlignError::Config { what: "rungs" }),
-            Rung::Single => self.descend(rung, vec![PlanarPose::default()], self.search(), None),
+            Rung::Single => self.descend(rung, vec![PlanarPose::default()], self.search(), None, kernels_m),
             Rung::Certified => self.certified(earlier),
-            Rung::Several => self.descend(rung, several(prior), self.search(), earlier),
+            Rung::Several => self.descend(rung, several(prior), self.search(), earlier, kernels_m),
             Rung::Grid => {
                 let mut search = self.search();
                 let starts = self.knots(&mut search, earlier);
-                self.descend_with(rung, starts, search, earlier, self.narrow())
+                self.descend(rung, starts, search, earlier, self.narrow())
             }
         }
     }
@@ -196,7 +197,8 @@ impl<'a> Problem<'a> {
     fn certified(&self, earlier: Option<&Earlier>) -> Result<Answer, AlignError> {
         let config = self.config;
         let kernel = config.final_kernel_m();
-        let mut answer = self.descend(Rung::Certified, several(&config.prior), self.search(), None)?;
+        let starts = several(&config.prior);
+        let mut answer = self.descend(Rung::Certified, starts, self.search(), None, &config.kernels_m)?;
         let mut search = self.search();
         // The proof begins with the best that is known, of the prior if anything there is: it is about the prior.
         let known = earlier.map(|e| e.refined).filter(|e| self.is_better(e, answer.best()));
@@ -208,17 +210,13 @@ impl<'a> Problem<'a> {
         let state = State::from_pose(answer.pose, self.centroid);
         if !best.state.is_near(&state) {
             let start = best.state.to_pose(self.centroid);
-            let better = self.descend_with(Rung::Certified, vec![start], self.search(), None, self.narrow())?;
+            let better = self.descend(Rung::Certified, vec![start], self.search(), None, self.narrow())?;
             if self.is_better(better.best(), answer.best()) {
                 answer = Answer { lookups: answer.lookups + better.lookups, ..better };
             }
         }
         answer.certificate = Some(certificate);
         Ok(answer)
-    }
-
-    fn fixed(&self, starts: &[PlanarPose]) -> Result<Answer, AlignError> {
-        self.descend(Rung::Fixed, starts.to_vec(), self.search(), None)
     }
 
     /// The best few knots of a grid of 2.5 degrees and 1 mm over the prior, `grasp_from_object`, and where the rung
@@ -280,21 +278,11 @@ impl<'a> Problem<'a> {
         }
     }
 
-    fn descend(
-        &self,
-        rung: Rung,
-        starts: Vec<PlanarPose>,
-        search: Search<'a>,
-        earlier: Option<&Earlier>,
-    ) -> Result<Answer, AlignError> {
-        self.descend_with(rung, starts, search, earlier, &self.config.kernels_m)
-    }
-
     /// Scouts from all starts, refines the best few, takes the cheapest: one within the prior if there is one, because
     /// a symmetric tool fits as well after a turn that no gripper makes.
     ///
     /// A run whose scouts end exactly where those of `earlier` did is not refined again.
-    fn descend_with(
+    fn descend(
         &self,
         rung: Rung,
         starts: Vec<PlanarPose>,
@@ -323,9 +311,8 @@ impl<'a> Problem<'a> {
         let mut runs = search.scout(&states, &self.scouts, kernels_m);
         let allowed = |run: &Progress| config.prior.allows(run.state.to_pose(c));
         let mut order: Vec<usize> = (0..runs.len()).filter(|&r| runs[r].merged_into.is_none()).collect();
-        order.sort_by(|&a, &b| {
-            allowed(&runs[b]).cmp(&allowed(&runs[a])).then_with(|| runs[a].cost.total_cmp(&runs[b].cost))
-        });
+        let better = |a: &Progress, b: &Progress| allowed(b).cmp(&allowed(a)).then_with(|| a.cost.total_cmp(&b.cost));
+        order.sort_by(|&a, &b| better(&runs[a], &runs[b]));
         let limit = runs[order[0]].cost * WORTH;
         let worth = order.iter().take(KEEP).take_while(|&&r| runs[r].cost <= limit).count();
         let (refined, rest) = order.split_at(worth.max(1));
@@ -346,13 +333,7 @@ impl<'a> Problem<'a> {
         for &run in rest {
             runs[run].cost = search.sums(&self.points, runs[run].state, kernel).cost / self.points.len() as f64;
         }
-        let winner = refined
-            .iter()
-            .copied()
-            .min_by(|&a, &b| {
-                allowed(&runs[b]).cmp(&allowed(&runs[a])).then_with(|| runs[a].cost.total_cmp(&runs[b].cost))
-            })
-            .unwrap_or(0);
+        let winner = refined.iter().copied().min_by(|&a, &b| better(&runs[a], &runs[b])).unwrap_or(0);
         let best = &runs[winner];
         let inlier_share = best.inliers as f64 / self.points.len() as f64;
         if inlier_share < MIN_SHARE {

@@ -1,7 +1,7 @@
 //! [`Uncertainty`]: spread of the errors that a pose may have, and [`Prior::slid_in`], which goes by it.
 
 use glam::DVec2;
-use nalgebra::{Matrix2, Matrix2x3, Matrix3, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix2x3, Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::observability::{Observability, observability};
@@ -104,12 +104,6 @@ impl Uncertainty {
         let spread = half.hypot(place[(0, 1)]);
         let direction = DVec2::from_angle(0.5 * place[(0, 1)].atan2(half));
         [direction * (mean + spread).max(0.0).sqrt(), direction.perp() * (mean - spread).max(0.0).sqrt()]
-    }
-
-    /// Standard deviation of that place along a unit direction `(y, z)`, meters.
-    pub fn along_m(&self, grasp_from_object: PlanarPose, direction: DVec2) -> f64 {
-        let direction = Vector2::new(direction.x, direction.y);
-        (self.place(grasp_from_object) * direction).dot(&direction).sqrt()
     }
 
     /// Standard deviation of that place along the axis where it is known least, meters.

@@ -171,58 +171,42 @@ impl Part {
     }
 
     fn height(&self, p: DVec2, section: Section, top_m: f64) -> Option<f64> {
-        let mut highest = None;
-        for d in self.across(p) {
-            let inset = self.half_width_m - d;
-            let height = match self.bends.iter().find(|bend| bend.rounds(p)) {
-                None => section.height(top_m, self.half_width_m, inset),
-                Some(bend) => {
-                    let Section::Crown { bead_m } = section else { continue };
-                    let bead = if d < bead_m { Some(section.height(top_m, self.half_width_m, inset)) } else { None };
-                    match (bend.height(p, top_m - bead_m - self.half_width_m), bead) {
-                        (Some(a), Some(b)) => a.max(b),
-                        (Some(a), None) | (None, Some(a)) => a,
-                        (None, None) => continue,
-                    }
-                }
-            };
-            highest = Some(highest.map_or(height, |h: f64| h.max(height)));
-        }
-        highest
+        let rounds = self.bends.iter().find(|bend| bend.rounds(p));
+        let height = |d: f64| {
+            let straight = || section.height(top_m, self.half_width_m, self.half_width_m - d);
+            let Some(bend) = rounds else { return Some(straight()) };
+            let Section::Crown { bead_m } = section else { return None };
+            let body = bend.height(p, top_m - bead_m - self.half_width_m);
+            body.into_iter().chain((d < bead_m).then(straight)).reduce(f64::max)
+        };
+        self.across(p).filter_map(height).reduce(f64::max)
+    }
+
+    /// Distance to the nearest stretch, by that across each, which the bend around `p` may round.
+    fn nearest(&self, p: DVec2, across: impl Fn(&Stretch, Option<&Bend>) -> f64) -> f64 {
+        let bend = self.bends.iter().find(|bend| bend.rounds(p));
+        let beside = self.stretches.iter().filter(|stretch| stretch.beyond_mitre(p) <= TOUCH_M);
+        beside.map(|stretch| both(across(stretch, bend), stretch.beyond_end(p))).fold(f64::INFINITY, f64::min)
     }
 
     fn outline_distance(&self, p: DVec2) -> f64 {
-        let mut nearest = f64::INFINITY;
-        for stretch in &self.stretches {
-            if stretch.beyond_mitre(p) > TOUCH_M {
-                continue;
-            }
-            let side = match self.bends.iter().find(|bend| bend.rounds(p)) {
-                Some(bend) => bend.outline_distance(p),
-                None => stretch.across(p).abs() - self.half_width_m,
-            };
-            nearest = nearest.min(both(side, stretch.beyond_end(p)));
-        }
-        nearest
+        self.nearest(p, |stretch, bend| match bend {
+            Some(bend) => bend.outline_distance(p),
+            None => stretch.across(p).abs() - self.half_width_m,
+        })
     }
 
     fn distance(&self, p: DVec2, h: f64, section: Section, top_m: f64) -> f64 {
-        let mut nearest = f64::INFINITY;
-        for stretch in &self.stretches {
-            if stretch.beyond_mitre(p) > TOUCH_M {
-                continue;
-            }
+        self.nearest(p, |stretch, bend| {
             let d = stretch.across(p).abs();
-            let across = match (self.bends.iter().find(|bend| bend.rounds(p)), section) {
+            match (bend, section) {
                 (Some(bend), Section::Crown { bead_m }) => {
                     let body = bend.distance(p, h, top_m - bead_m - self.half_width_m);
                     body.min(section.bead_distance(top_m, d, h))
                 }
                 _ => section.distance(top_m, self.half_width_m, self.half_width_m - d, h),
-            };
-            nearest = nearest.min(both(across, stretch.beyond_end(p)));
-        }
-        nearest
+            }
+        })
     }
 }
 

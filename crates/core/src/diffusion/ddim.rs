@@ -10,9 +10,6 @@ use super::{
     Denoiser, GaussianNoise, ModelError, Prediction, Progress, Schedule, ScheduleError, Spacing, Step, Tensor, Watch,
 };
 
-/// A clean latent, `[batch, channels, height, width]`.
-pub(crate) type Latent = Tensor;
-
 /// Sampler: the rule by which the noise is taken away.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[derive(Serialize, Deserialize, strum::EnumIter, strum::EnumString, strum::IntoStaticStr)]
@@ -139,7 +136,7 @@ pub fn sample(
     seeds: &[u64],
     condition: &Tensor,
     watch: &mut dyn Watch,
-) -> Result<Latent, DiffusionError> {
+) -> Result<Tensor, DiffusionError> {
     if !(0.0..=1.0).contains(&config.eta) {
         return Err(DiffusionError::Choice(format!("eta is {}; choose 0 (deterministic) to 1", config.eta)));
     }

@@ -7,7 +7,7 @@ use super::Prediction;
 /// The share of signal ᾱ at each training step, in f64, never rising.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Schedule {
-    alpha_bar: Vec<f64>,
+    pub(super) alpha_bar: Vec<f64>,
 }
 
 /// Spacing of the training steps that a sampler visits.
@@ -63,19 +63,6 @@ impl Schedule {
         Ok(Self { alpha_bar })
     }
 
-    /// From the noise variance added at each training step.
-    fn from_betas(betas: impl Iterator<Item = f64>) -> Result<Self, ScheduleError> {
-        let mut product = 1.0;
-        Self::from_alpha_bar(
-            betas
-                .map(|beta| {
-                    product *= 1.0 - beta;
-                    product
-                })
-                .collect(),
-        )
-    }
-
     /// Square roots of the betas evenly spaced: what latent diffusion calls "linear". The lab: (1000, 0.0015, 0.0155).
     ///
     /// # Errors
@@ -83,13 +70,12 @@ impl Schedule {
     pub fn scaled_linear(steps: usize, beta_start: f64, beta_end: f64) -> Result<Self, ScheduleError> {
         check_betas(steps, beta_start, beta_end)?;
         let (start, end) = (beta_start.sqrt(), beta_end.sqrt());
-        Self::from_betas((0..steps).map(|i| (start + fraction(i, steps) * (end - start)).powi(2)))
-    }
-
-    /// ᾱ of every training step.
-    #[cfg(test)]
-    pub(crate) fn alpha_bar(&self) -> &[f64] {
-        &self.alpha_bar
+        let fraction = |i: usize| i as f64 / (steps.max(2) - 1) as f64;
+        let alpha_bar = (0..steps).scan(1.0, |product, i| {
+            *product *= 1.0 - (start + fraction(i) * (end - start)).powi(2);
+            Some(*product)
+        });
+        Self::from_alpha_bar(alpha_bar.collect())
     }
 
     /// The number of training steps.
@@ -141,10 +127,6 @@ impl Schedule {
     }
 }
 
-fn fraction(i: usize, steps: usize) -> f64 {
-    if steps == 1 { 0.0 } else { i as f64 / (steps - 1) as f64 }
-}
-
 fn check_betas(steps: usize, start: f64, end: f64) -> Result<(), ScheduleError> {
     check_length(steps)?;
     let inside = |beta: f64| beta > 0.0 && beta < 1.0;
@@ -180,7 +162,7 @@ mod tests {
         for (step, expected, tolerance) in
             [(0, 0.9985, 1e-9), (1, 0.996_995_6, 5e-8), (996, 0.000_700_70, 5e-9), (999, 0.000_668_67, 5e-9)]
         {
-            let alpha_bar = schedule.alpha_bar()[step];
+            let alpha_bar = schedule.alpha_bar[step];
             assert!((alpha_bar - expected).abs() < tolerance, "step {step}: {alpha_bar}");
         }
     }

@@ -6,7 +6,7 @@ use std::fmt;
 use glam::DVec3;
 
 use super::fit::{angle_error_rad, grainless, likeness, registered};
-use super::{Cause, Doubt, Gain, SAME, median};
+use super::{Cause, Doubt, Gain, PairInput, SAME, median};
 use crate::field::DistanceField;
 use crate::mesh::TriMesh;
 use crate::read_as::{Depths, Lay, ReadAs};
@@ -96,13 +96,13 @@ struct Pairs<'a> {
 }
 
 impl<'a> Pairs<'a> {
-    fn of(samples: &[&Sample], named: &[Option<&'a str>], meshes: &'a BTreeMap<String, TriMesh>) -> Self {
+    fn of(pairs: &[PairInput<'a>], meshes: &'a BTreeMap<String, TriMesh>) -> Self {
         let fields: BTreeMap<&str, DistanceField> = meshes
             .iter()
             .filter_map(|(name, mesh)| Some((name.as_str(), DistanceField::from_mesh(mesh).ok()?)))
             .collect();
         let (mut at, mut taken, mut tools) = (Vec::new(), Vec::new(), Vec::new());
-        for (index, (sample, tool)) in samples.iter().zip(named).enumerate() {
+        for (index, PairInput { tool, sample, .. }) in pairs.iter().enumerate() {
             let Some(tool) = tool.filter(|tool| fields.contains_key(tool)) else { continue };
             if !sample.pads.iter().flatten().any(|t| t.depth().is_some() && t.camera().is_some()) {
                 continue;
@@ -136,12 +136,11 @@ impl<'a> Pairs<'a> {
 /// Doubt about the imprints of some pairs, or about their CAD models, with the mean likeness where it is mended; 0 where
 /// nothing mends it. Other CAD models are tried where that is asked.
 pub(super) fn judge(
-    samples: &[&Sample],
-    named: &[Option<&str>],
+    pairs: &[PairInput<'_>],
     meshes: &BTreeMap<String, TriMesh>,
     try_models: bool,
 ) -> Option<(Doubt, f64)> {
-    let pairs = Pairs::of(samples, named, meshes);
+    let pairs = Pairs::of(pairs, meshes);
     if pairs.samples.is_empty() {
         return None;
     }

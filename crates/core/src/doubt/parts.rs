@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::poses::{Models, Registered};
-use super::{Cause, Doubt, PairInput, imprints};
+use super::{Cause, Doubt, PairInput, imprints, with_samples};
 use crate::contact::{flat_m, rise};
 use crate::mesh::TriMesh;
 use crate::rig::PadId;
@@ -33,9 +33,8 @@ struct Alone {
 impl Alone {
     fn of(pairs: &[PairInput<'_>], models: &Models<'_>, pad: PadId) -> Self {
         let samples: Vec<Sample> = pairs.iter().map(|pair| alone(pair.sample, pad)).collect();
-        let each = pairs.iter().zip(&samples).map(|(pair, sample)| PairInput { sample, ..*pair });
-        let registered = Registered::of(&each.collect::<Vec<_>>(), models);
-        let (tried, right, contradicting) = (registered.tried(), registered.right(), registered.contradicting());
+        let registered = Registered::of(&with_samples(pairs, &samples), models);
+        let (tried, right, contradicting) = (registered.tried, registered.right(), registered.contradicting);
         Self { pad, samples, tried, right, contradicting }
     }
 
@@ -81,9 +80,8 @@ pub(super) fn of_fingers(
         "registered by the {name} alone, {} of {} poses are good and near the truth, by the {other} alone {} of {}",
         wrong.right, wrong.tried, sound.right, sound.tried
     );
-    let named: Vec<Option<&str>> = pairs.iter().map(|pair| pair.tool).collect();
-    let samples: Vec<&Sample> = wrong.samples.iter().collect();
-    let read_as = imprints::judge(&samples, &named, tools, false).and_then(|(doubt, _)| doubt.read_as());
+    let read_as =
+        imprints::judge(&with_samples(pairs, &wrong.samples), tools, false).and_then(|(doubt, _)| doubt.read_as());
     let how = read_as.map_or("its imprints do not lie on the CAD models".into(), super::ReadAs::mistake);
     let what = format!("of the {name} alone {how}: {figures}");
     Some(Doubt::new(Cause::Finger(read_as), what, "correct what writes that finger's files"))

@@ -166,10 +166,11 @@ pub(super) struct Registered<'m, 'a> {
     sure: Vec<Sure>,
     models: &'m Models<'a>,
     /// Pairs with a CAD model and cameras, those of them with a truth, and those whose registration is wrong by its verdict.
-    tried: usize,
+    pub(super) tried: usize,
     asked: usize,
     wrong: usize,
-    contradicting: usize,
+    /// Poses that contradict the touch: none was found, the verdict calls it wrong, or the angle is far from the true one.
+    pub(super) contradicting: usize,
     /// Largest error of a registered angle, radians; 0 where no truth is known.
     largest_error_rad: f64,
 }
@@ -202,20 +203,10 @@ impl<'m, 'a> Registered<'m, 'a> {
         Self { sure: sure.collect(), models, tried: tried.len(), asked, wrong, contradicting, largest_error_rad }
     }
 
-    /// Poses that contradict the touch: none was found, the verdict calls it wrong, or the angle is far from the true one.
-    pub(super) fn contradicting(&self) -> usize {
-        self.contradicting
-    }
-
     /// Figures that a cure must not worsen.
     pub(super) fn worth(&self) -> Worth {
         let Self { tried, wrong, largest_error_rad, .. } = *self;
         Worth { tried, good: self.sure.len(), wrong, largest_error_rad }
-    }
-
-    /// Pairs with a CAD model and cameras.
-    pub(super) fn tried(&self) -> usize {
-        self.tried
     }
 
     /// Good registrations that are near the truth, where it is known.

@@ -36,16 +36,16 @@ pub(super) enum Of {
 
 /// The columns of a group, in the paper's order.
 pub(super) static COLUMNS: &[Column] = &[
-    db("PSNR dB", "psnr_db", "Against the measured imprint, decibels; peak 22.5 mm", |tool| {
+    tenths("PSNR dB", "psnr_db", "Against the measured imprint, decibels; peak 22.5 mm", |tool| {
         psnr(tool, |image| Some(image.error))
     }),
-    db(
+    tenths(
         "clean dB",
         "psnr_noise_free_db",
         "PSNR against the simulator's imprint before camera noise, decibels",
         |tool| psnr(tool, |image| image.noise_free),
     ),
-    ssim("SSIM", "ssim", "Structural similarity; range of the tool's predictions (the lab's)", |tool| {
+    hundredths("SSIM", "ssim", "Structural similarity; range of the tool's predictions (the lab's)", |tool| {
         mean(images(tool).filter_map(|i| i.ssim))
     }),
     Column {
@@ -64,8 +64,8 @@ pub(super) static COLUMNS: &[Column] = &[
         larger_is_better: false,
         of: Of::Tool(|tool| angles(tool)?.mean_deg),
     },
-    percent("≤5° %", "success_5", "Share of grasps within 5 degrees, percent", |tool| Some(angles(tool)?.success_5)),
-    percent("≤10° %", "success_10", "Share of grasps within 10 degrees, percent", |tool| {
+    tenths("≤5° %", "success_5", "Share of grasps within 5 degrees, percent", |tool| Some(angles(tool)?.success_5)),
+    tenths("≤10° %", "success_10", "Share of grasps within 10 degrees, percent", |tool| {
         Some(angles(tool)?.success_10)
     }),
     Column {
@@ -76,10 +76,13 @@ pub(super) static COLUMNS: &[Column] = &[
         larger_is_better: false,
         of: Of::Tool(|tool| mean(tool.iter().filter_map(|g| g.position_error_m)).map(|m| m * 1e3)),
     },
-    ssim("IoU", "mask_iou", "Intersection over union of contact masks with the simulator's true contact", |tool| {
-        mean(images(tool).filter_map(|i| i.mask_iou))
-    }),
-    percent(
+    hundredths(
+        "IoU",
+        "mask_iou",
+        "Intersection over union of contact masks with the simulator's true contact",
+        |tool| mean(images(tool).filter_map(|i| i.mask_iou)),
+    ),
+    tenths(
         "good %",
         "verdict_good",
         "Share of grasps whose pose the verdict calls good, without the truth, percent",
@@ -116,16 +119,12 @@ fn features<'a>(grasps: &'a [&GraspScore]) -> Vec<&'a [f32]> {
 
 type OfTool = fn(&[&GraspScore]) -> Option<f64>;
 
-const fn db(heading: &'static str, key: &'static str, tip: &'static str, of: OfTool) -> Column {
+const fn tenths(heading: &'static str, key: &'static str, tip: &'static str, of: OfTool) -> Column {
     Column { heading, tip, decimals: 1, larger_is_better: true, key, of: Of::Tool(of) }
 }
 
-const fn ssim(heading: &'static str, key: &'static str, tip: &'static str, of: OfTool) -> Column {
-    Column { decimals: 2, ..db(heading, key, tip, of) }
-}
-
-const fn percent(heading: &'static str, key: &'static str, tip: &'static str, of: OfTool) -> Column {
-    db(heading, key, tip, of)
+const fn hundredths(heading: &'static str, key: &'static str, tip: &'static str, of: OfTool) -> Column {
+    Column { decimals: 2, ..tenths(heading, key, tip, of) }
 }
 
 /// The figures of one method in one column group. A column without one cannot be there, as the notes say.

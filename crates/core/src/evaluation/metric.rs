@@ -9,7 +9,7 @@ use strum::IntoEnumIterator as _;
 use super::{GraspScore, mean, psnr};
 use crate::verdict::Grade;
 
-/// A metric of a grasp: a row of [`ROWS`]. Lists, filters and pictures follow; the most telling first.
+/// A metric of a grasp: a row of a table. Lists, filters and pictures follow; the most telling first.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[derive(strum::EnumIter, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -29,10 +29,11 @@ pub enum Metric {
 
 /// A row of the table of metrics.
 struct Row {
-    metric: Metric,
     name: &'static str,
+    /// The word in the filter of the list.
     key: &'static str,
     tip: &'static str,
+    /// The unit on screen; empty for a number without one.
     unit: &'static str,
     /// Factor from the value to the unit on screen.
     factor: f64,
@@ -41,71 +42,55 @@ struct Row {
     of: fn(&GraspScore) -> Option<f64>,
 }
 
-const PLAIN: Row = Row {
-    metric: Metric::Angle,
-    name: "",
-    key: "",
-    tip: "",
-    unit: "",
-    factor: 1.0,
-    decimals: 3,
-    larger_is_better: true,
-    of: |_| None,
-};
+const PLAIN: Row =
+    Row { name: "", key: "", tip: "", unit: "", factor: 1.0, decimals: 3, larger_is_better: true, of: |_| None };
 const DB: Row = Row { unit: "dB", decimals: 1, ..PLAIN };
 
-/// The table.
-static ROWS: &[Row] = &[
-    Row {
-        metric: Metric::Angle,
-        name: "Angle error",
-        key: "angle",
-        tip: "Error of the in-hand angle from the contact of both fingers, degrees",
-        unit: "°",
-        factor: 1f64.to_degrees(),
-        decimals: 1,
-        larger_is_better: false,
-        of: |grasp| grasp.angle_error_rad,
-    },
-    Row {
-        metric: Metric::Verdict,
-        name: "Verdict",
-        key: "verdict",
-        tip: "How much the pose can be relied on, without the truth: good, check or wrong",
-        decimals: 0,
-        larger_is_better: false,
-        of: |grasp| grasp.verdict.map(|grade| f64::from(grade as u8)),
-        ..PLAIN
-    },
-    Row {
-        metric: Metric::Psnr,
-        name: "PSNR",
-        key: "psnr",
-        tip: "Against the measured imprint, dB; peak 22.5 mm, or both scaled to 0..1 where the scale is assumed",
-        of: |grasp| psnr(&[grasp], |image| Some(image.error)),
-        ..DB
-    },
-    Row {
-        metric: Metric::Ssim,
-        name: "SSIM",
-        key: "ssim",
-        tip: "Structural similarity; range of the tool's predictions (the lab's), or both scaled to 0..1 where the scale is assumed",
-        of: |grasp| mean(grasp.images.iter().filter_map(|image| image.ssim)),
-        ..PLAIN
-    },
-    Row {
-        metric: Metric::PsnrNoiseFree,
-        name: "PSNR noise-free",
-        key: "psnr-clean",
-        tip: "Against the simulator's imprint without camera noise, dB",
-        of: |grasp| psnr(&[grasp], |image| image.noise_free),
-        ..DB
-    },
-];
-
 impl Metric {
-    fn row(self) -> &'static Row {
-        ROWS.iter().find(|row| row.metric == self).unwrap_or(&PLAIN)
+    /// The row of the table.
+    fn row(self) -> Row {
+        match self {
+            Self::Angle => Row {
+                name: "Angle error",
+                key: "angle",
+                tip: "Error of the in-hand angle from the contact of both fingers, degrees",
+                unit: "°",
+                factor: 1f64.to_degrees(),
+                decimals: 1,
+                larger_is_better: false,
+                of: |grasp| grasp.angle_error_rad,
+            },
+            Self::Verdict => Row {
+                name: "Verdict",
+                key: "verdict",
+                tip: "How much the pose can be relied on, without the truth: good, check or wrong",
+                decimals: 0,
+                larger_is_better: false,
+                of: |grasp| grasp.verdict.map(|grade| f64::from(grade as u8)),
+                ..PLAIN
+            },
+            Self::Psnr => Row {
+                name: "PSNR",
+                key: "psnr",
+                tip: "Against the measured imprint, dB; peak 22.5 mm, or both scaled to 0..1 where the scale is assumed",
+                of: |grasp| psnr(&[grasp], |image| Some(image.error)),
+                ..DB
+            },
+            Self::Ssim => Row {
+                name: "SSIM",
+                key: "ssim",
+                tip: "Structural similarity; range of the tool's predictions (the lab's), or both scaled to 0..1 where the scale is assumed",
+                of: |grasp| mean(grasp.images.iter().filter_map(|image| image.ssim)),
+                ..PLAIN
+            },
+            Self::PsnrNoiseFree => Row {
+                name: "PSNR noise-free",
+                key: "psnr-clean",
+                tip: "Against the simulator's imprint without camera noise, dB",
+                of: |grasp| psnr(&[grasp], |image| image.noise_free),
+                ..DB
+            },
+        }
     }
 
     /// The name on screen.
@@ -113,19 +98,9 @@ impl Metric {
         self.row().name
     }
 
-    /// The word in the filter of the list.
-    pub fn key(self) -> &'static str {
-        self.row().key
-    }
-
     /// The meaning, in a line.
     pub fn tip(self) -> &'static str {
         self.row().tip
-    }
-
-    /// The unit on screen; empty for a number without one.
-    pub fn unit(self) -> &'static str {
-        self.row().unit
     }
 
     /// The decimals on screen.
@@ -148,13 +123,9 @@ impl Metric {
         if value.is_nan() {
             return if self == Self::Angle { "no pose".into() } else { "–".into() };
         }
-        let space = if matches!(self.unit(), "" | "°") { "" } else { " " };
-        format!("{:.*}{space}{}", self.decimals(), self.shown(value), self.unit())
-    }
-
-    /// True where a larger value is a better one.
-    pub fn larger_is_better(self) -> bool {
-        self.row().larger_is_better
+        let Row { unit, decimals, .. } = self.row();
+        let space = if matches!(unit, "" | "°") { "" } else { " " };
+        format!("{:.decimals$}{space}{unit}", self.shown(value))
     }
 
     /// Order of two values, the worse one first. A metric that is not a number (no pose was found) is the worst.
@@ -164,7 +135,7 @@ impl Metric {
 
     /// A number that grows as the value gets worse.
     pub fn badness(self, value: f64) -> f64 {
-        match (value.is_nan(), self.larger_is_better()) {
+        match (value.is_nan(), self.row().larger_is_better) {
             (true, _) => f64::INFINITY,
             (false, true) => -value,
             (false, false) => value,
@@ -208,7 +179,7 @@ impl Condition {
             None => (side, &rest[1..]),
         };
         let (source, key) = left.rsplit_once(':').unwrap_or(("", left));
-        let metric = Metric::iter().find(|metric| metric.key() == key)?;
+        let metric = Metric::iter().find(|metric| metric.row().key == key)?;
         let bound = match (metric, Grade::from_str(number)) {
             (Metric::Verdict, Ok(grade)) => f64::from(grade as u8),
             _ => number.trim_end_matches('°').parse().ok().filter(|b: &f64| !b.is_nan())?,
@@ -218,7 +189,7 @@ impl Condition {
 
     /// True where a value passes. What failed is worse than any number.
     pub fn passes(&self, value: f64) -> bool {
-        let worst = if self.metric.larger_is_better() { f64::NEG_INFINITY } else { f64::INFINITY };
+        let worst = if self.metric.row().larger_is_better { f64::NEG_INFINITY } else { f64::INFINITY };
         let shown = if value.is_nan() { worst } else { self.metric.shown(value) };
         self.passes.contains(&shown.total_cmp(&self.bound))
     }
@@ -248,7 +219,7 @@ mod tests {
         }
         for metric in Metric::iter() {
             assert!(!metric.name().is_empty());
-            assert_eq!(Condition::parse(&format!("{}>0", metric.key())).map(|c| c.metric), Some(metric));
+            assert_eq!(Condition::parse(&format!("{}>0", metric.row().key)).map(|c| c.metric), Some(metric));
         }
     }
 

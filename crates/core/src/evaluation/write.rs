@@ -1,31 +1,22 @@
 //! The table as text and CSV.
 
+use std::collections::BTreeSet;
+
 use super::columns::{COLUMNS, Column, columns};
 use super::{Estimate, Group, Row, TableMetrics};
-
-fn groups(rows: &[Row]) -> Vec<Group> {
-    let mut groups: Vec<Group> =
-        rows.iter().flat_map(|r| &r.groups).filter(|f| f.grasps > 0).map(|f| f.group).collect();
-    groups.sort_unstable();
-    groups.dedup();
-    groups
-}
 
 fn of(row: &Row, group: Group) -> Option<&TableMetrics> {
     row.groups.iter().find(|f| f.group == group)
 }
 
-/// A figure without its interval; `-` for none.
-fn number(estimate: Option<Estimate>, decimals: usize) -> String {
-    estimate.map_or_else(|| "-".into(), |e| format!("{:.decimals$}", e.value))
-}
-
+/// A figure and its interval where it has one; `-` for none.
 fn with_interval(estimate: Option<Estimate>, decimals: usize) -> String {
     match estimate {
         Some(Estimate { value, interval: Some([low, high]) }) => {
             format!("{value:.decimals$} [{low:.decimals$} {high:.decimals$}]")
         }
-        other => number(other, decimals),
+        Some(Estimate { value, interval: None }) => format!("{value:.decimals$}"),
+        None => "-".into(),
     }
 }
 
@@ -41,7 +32,9 @@ pub fn text(rows: &[Row]) -> String {
         });
         table(group, &columns, &lines.collect::<Vec<_>>())
     };
-    groups(rows).into_iter().map(of_group).collect()
+    let figures = rows.iter().flat_map(|row| &row.groups).filter(|figures| figures.grasps > 0);
+    let groups: BTreeSet<Group> = figures.map(|figures| figures.group).collect();
+    groups.into_iter().map(of_group).collect()
 }
 
 /// A line of a table for people.

@@ -63,12 +63,8 @@ pub(super) fn about_as_deep(imprint: &DepthMap, seed: DVec2, tolerance_m: f64) -
     let (width, height) = (imprint.width(), imprint.height());
     let mut mask = Mask::filled(width, height, false);
     let start_px = seed.round();
-    if !start_px.is_finite()
-        || start_px.x < 0.0
-        || start_px.y < 0.0
-        || start_px.x >= width as f64
-        || start_px.y >= height as f64
-    {
+    let size = DVec2::new(width as f64, height as f64);
+    if !(start_px.cmpge(DVec2::ZERO).all() && start_px.cmplt(size).all()) {
         return mask;
     }
     let start = (start_px.x as usize, start_px.y as usize);

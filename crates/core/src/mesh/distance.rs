@@ -69,10 +69,8 @@ impl MeshDistance {
         if let Some(triangle) = mesh.triangles.iter().position(|t| t.iter().any(|&v| v as usize >= corners)) {
             return Err(MeshError::Index { triangle });
         }
-        let mut triangles: Vec<[DVec3; 3]> = (0..mesh.triangles.len())
-            .map(|i| mesh.corners(i))
-            .filter(|t| t.iter().all(|p| p.is_finite()) && triangle_area(*t) > 0.0)
-            .collect();
+        let mut triangles = mesh.sound_triangles();
+        triangles.retain(|triangle| triangle_area(*triangle) > 0.0);
         if triangles.is_empty() {
             return Err(MeshError::Empty);
         }

@@ -1,7 +1,7 @@
 //! From a decoder's picture to what a color sensor would have seen.
 
 use super::{PostprocessError, RawPrediction};
-use crate::grid::{DepthMap, RgbGrid};
+use crate::grid::RgbGrid;
 use crate::resample::Resampling;
 
 /// The steps to a color sensor's difference of touched and untouched image.
@@ -15,15 +15,6 @@ pub struct ColorChain {
     pub resampling: Resampling,
     /// Rotation to the sensor's raw orientation: 0 or 180 degrees.
     pub rotation_deg: u32,
-}
-
-/// A prediction as a person looks at it.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Picture {
-    /// Of a depth sensor: the imprint, meters.
-    Depth(DepthMap),
-    /// Of a color sensor: the difference of touched and untouched image, 0..255 scale.
-    Color(RgbGrid),
 }
 
 impl ColorChain {

@@ -88,23 +88,14 @@ impl Condition {
                         let drawn = RgbGrid::from_fn(difference.width(), difference.height(), |_, _| {
                             NOISE_STD.map(|std| std * noise.normal())
                         });
-                        add(difference, &drawn);
+                        difference.add(&drawn);
                         if let Some(images) = images {
-                            add(&mut images.raw, &drawn);
+                            images.raw.add(&drawn);
                         }
                     }
                 }
                 sample
             }
-        }
-    }
-}
-
-/// Adds an image of the same size.
-fn add(image: &mut RgbGrid, other: &RgbGrid) {
-    for (p, q) in image.as_mut_slice().iter_mut().zip(other.as_slice()) {
-        for (p, q) in p.iter_mut().zip(q) {
-            *p += q;
         }
     }
 }

@@ -7,7 +7,6 @@ use super::{BubbleConfig, rig};
 use crate::grid::{DepthMap, Grid, Mask};
 use crate::noise::{Noise, Stream, blur3};
 use crate::rig::{PadId, lab};
-use crate::sensor::Intrinsics;
 
 /// Membrane points up to this far from the tool count as contact, meters: the lab labels its masks so.
 pub(crate) const CONTACT_DISTANCE_M: f64 = 0.001;
@@ -17,14 +16,13 @@ const MAX_SLOPE: f64 = 2.5;
 
 /// The rays of one camera in the coordinates of its membrane (n, y, z).
 pub(super) struct Rays {
-    intrinsics: Intrinsics,
     grasp_from_camera: DAffine3,
     outward: f64,
 }
 
 impl Rays {
-    pub(super) fn new(finger: PadId, intrinsics: Intrinsics, grasp_from_camera: DAffine3) -> Self {
-        Self { intrinsics, grasp_from_camera, outward: rig::outward(finger) }
+    pub(super) fn new(finger: PadId, grasp_from_camera: DAffine3) -> Self {
+        Self { grasp_from_camera, outward: rig::outward(finger) }
     }
 
     /// Origin of all rays.
@@ -35,7 +33,7 @@ impl Rays {
 
     /// Direction of pixel `(u, v)`: a point at depth `z` is `origin + z * direction`.
     fn direction(&self, u: usize, v: usize) -> DVec3 {
-        let d = self.grasp_from_camera.matrix3 * lab::BUBBLE.crop.lift(&self.intrinsics, u as f64, v as f64, 1.0);
+        let d = self.grasp_from_camera.matrix3 * lab::BUBBLE.crop.lift(&rig::INTRINSICS, u as f64, v as f64, 1.0);
         DVec3::new(self.outward * d.x, d.y, d.z)
     }
 

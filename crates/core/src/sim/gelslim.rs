@@ -14,7 +14,7 @@ use crate::grid::RgbGrid;
 use crate::noise::{Noise, Stream};
 use crate::relax::{Field, Problem};
 use crate::rig::{PadId, lab};
-use crate::sample::{ColorImages, ColorTouch};
+use crate::sample::ColorTouch;
 
 /// Spacing of the grid that the gel is solved on, meters.
 const STEP_M: f64 = 0.000_15;
@@ -212,10 +212,7 @@ pub(super) fn touch(
         stamp(&mut raw, &frame.lens, place, size, config.marker_darkness);
     }
     add_noise(&mut raw, config.noise, &mut Noise::new(seed, Stream::GelNoise, finger.index()));
-    let difference = RgbGrid::from_fn(lab::GELSLIM.width, lab::GELSLIM.height, |x, y| {
-        std::array::from_fn(|c| raw[(x, y)][c] - reference[(x, y)][c])
-    });
-    ColorTouch { images: Some(ColorImages { raw, reference }), difference }
+    ColorTouch::from_images(raw, reference).expect("both pictures have the size of the sensor")
 }
 
 /// The light without contact and without markers: each LED is brighter on its own side.
@@ -253,11 +250,7 @@ fn shade(image: &mut RgbGrid, config: &GelSlimConfig, gel: &Gel, frame: &Frame, 
             (light + config.color_drift[c] * f64::from(slow[c][(i, j)])) as f32
         })
     });
-    for (pixel, light) in image.as_mut_slice().iter_mut().zip(light.as_slice()) {
-        for c in 0..3 {
-            pixel[c] += light[c];
-        }
-    }
+    image.add(&light);
 }
 
 /// Places on the gel, meters, by the cell of a finger's marker lattice and the marker's own shift, in cells.

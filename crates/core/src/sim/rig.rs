@@ -7,8 +7,6 @@
 
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 
-#[cfg(test)]
-use super::Lens;
 use crate::rig::{PadId, Rig, Window, lab};
 use crate::sensor::Intrinsics;
 
@@ -50,6 +48,7 @@ pub fn gelslim_yz(finger: PadId, flat: DVec2) -> DVec2 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sim::Lens;
 
     #[test]
     fn rotations_are_the_labs_and_the_cameras_face_each_other() {

@@ -38,8 +38,7 @@ pub fn deviation(clouds: &Clouds, tool: &ToolModel, grasp_from_object: PlanarPos
     let object_from_grasp = grasp_from_object.to_affine().inverse();
     let points = clouds.fingers.as_ref().map(|cloud| {
         cloud.map(|cloud| {
-            let contact = cloud.points.iter().zip(&cloud.contact).filter(|(_, contact)| **contact);
-            let contact: Vec<_> = contact.map(|(p, _)| *p).collect();
+            let contact: Vec<_> = cloud.contact_points().collect();
             of_points(&contact, &object_from_grasp, &tool.distance)
         })
     });

@@ -10,7 +10,7 @@ use crate::export::DrawnMasks;
 use crate::io::dataset::{Dataset, SourceKind, ToolScale};
 use crate::job::JobCx;
 use crate::labels::Review;
-use crate::pairs::spread;
+use crate::pairs::{by_tool, spread};
 use crate::steps::tool::{offer, units_of};
 use touch2touch_core::dataset::{PairId, Split};
 use touch2touch_core::rig::SensorKind;
@@ -99,18 +99,12 @@ fn pairs(dataset: &Dataset, looked_at: &[Sample], asked: usize) -> Fact {
 }
 
 fn tools(dataset: &Dataset) -> Fact {
-    let mut of: BTreeMap<&str, usize> = BTreeMap::new();
-    dataset
-        .index
-        .pairs
-        .iter()
-        .filter_map(|pair| pair.tool.as_deref())
-        .for_each(|tool| *of.entry(tool).or_default() += 1);
+    let mut of = by_tool(dataset);
+    let without = of.remove(&None).map_or(0, |ids| ids.len());
     if of.is_empty() {
         return Fact::plain(Topic::Tools, "unknown: no CAD model, no pose");
     }
-    let list = named(of.iter().map(|(tool, count)| (*tool, Some(*count))));
-    let without = dataset.index.pairs.len() - of.values().sum::<usize>();
+    let list = named(of.iter().map(|(tool, ids)| (tool.unwrap_or_default(), Some(ids.len()))));
     let without = if without > 0 { format!("; {} without a tool", counted(without, "pair")) } else { String::new() };
     Fact::plain(Topic::Tools, format!("{}: {list}{without}", counted(of.len(), "tool")))
 }

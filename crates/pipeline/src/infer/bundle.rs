@@ -141,8 +141,9 @@ pub const MANIFEST: &str = "manifest.json";
 const MAX_MANIFEST: u64 = 4 << 20;
 
 /// Task of a graph.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, strum::IntoStaticStr)]
 #[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
 pub enum Role {
     /// Turns the GelSlim difference into the condition of the denoiser.
     ConditionEncoder,
@@ -159,13 +160,7 @@ pub enum Role {
 impl Role {
     /// The key in the manifest.
     pub fn key(self) -> &'static str {
-        match self {
-            Role::ConditionEncoder => "condition_encoder",
-            Role::Denoiser => "denoiser",
-            Role::Decoder => "decoder",
-            Role::MaskUnet => "mask_unet",
-            Role::ToolClassifier => "tool_classifier",
-        }
+        self.into()
     }
 }
 

@@ -22,6 +22,8 @@ use strum::IntoEnumIterator as _;
 use super::bundle::{BundleFile, Role};
 pub use super::provider::Provider;
 use crate::io::files;
+#[cfg(feature = "onnx")]
+pub(super) use ort_engine::{library, try_provider};
 use touch2touch_core::diffusion::{ModelError, Tensor};
 
 /// An engine.
@@ -316,12 +318,6 @@ pub fn resolve(_: EngineChoice) -> Result<EngineKind, EngineError> {
     Err(EngineError::NotInThisBuild)
 }
 
-/// The library of ONNX Runtime in use, loaded on the first call, or all the places that were searched in vain.
-#[cfg(feature = "onnx")]
-pub(super) fn library() -> Result<Library, Vec<Searched>> {
-    ort_engine::library()
-}
-
 /// Exact build of an engine that [`resolve`] gave: its name, and its library's own words where it has one.
 pub(super) fn build(engine: EngineKind) -> String {
     match engine {
@@ -351,12 +347,6 @@ pub(super) enum NoProvider {
         /// ONNX Runtime's words.
         said: String,
     },
-}
-
-/// Starts a provider with a graph of one operator, once in a program's life.
-#[cfg(feature = "onnx")]
-pub(super) fn try_provider(provider: Provider) -> Result<(), NoProvider> {
-    ort_engine::try_provider(provider)
 }
 
 /// A place that was searched without success.

@@ -16,8 +16,8 @@ use touch2touch_core::diffusion::{
     Denoiser, DiffusionError, GenerateConfig, ModelError, Prediction, Progress, Tensor, sample,
 };
 use touch2touch_core::fit::Fitted;
-use touch2touch_core::grid::{DepthMap, Grid, RgbGrid};
-use touch2touch_core::postprocess::{Picture, PostprocessError, RawPrediction, ShiftMode};
+use touch2touch_core::grid::{Grid, RgbGrid};
+use touch2touch_core::postprocess::RawPrediction;
 
 /// Why there is no prediction.
 #[derive(Debug, thiserror::Error)]
@@ -132,7 +132,7 @@ impl Generator {
 
     /// Predicts what the Soft Bubble feels where the GelSlim felt `difference` (signed, 0..255 scale, any size).
     ///
-    /// The result is in the decoder's range and orientation; [`Generator::depth`] turns it into meters.
+    /// The result is in the decoder's range and orientation; [`GeneratorSpec::depth_chain`] turns it into meters.
     /// `progress` is called before each sampling step; `Break` cancels within one step.
     ///
     /// # Errors
@@ -145,26 +145,6 @@ impl Generator {
     ) -> Result<RawPrediction, GenerateError> {
         let mut one = self.run(&[difference], &[Item { image: 0, seed: config.seed }], config, &mut progress)?;
         Ok(one.remove(0))
-    }
-
-    /// The depth in meters, in the raw orientation of the lab's bubble files, as the user wants it read.
-    ///
-    /// # Errors
-    /// [`PostprocessError::NoStatistics`] for the paper's shift without statistics.
-    pub fn depth(&self, raw: &RawPrediction, mode: ShiftMode) -> Result<DepthMap, PostprocessError> {
-        self.spec.depth_chain(mode)?.run(raw)
-    }
-
-    /// Picture that the user sees of a prediction: depth in meters, or a color sensor's difference, in the sensor's own
-    /// raw orientation.
-    ///
-    /// # Errors
-    /// As [`Generator::depth`].
-    pub fn picture(&self, raw: &RawPrediction, mode: ShiftMode) -> Result<Picture, PostprocessError> {
-        match self.spec.color_chain() {
-            Some(chain) => Ok(Picture::Color(chain.run(raw)?)),
-            None => Ok(Picture::Depth(self.depth(raw, mode)?)),
-        }
     }
 
     /// Any images from any seeds: each image is encoded once, however many seeds it has, and each item comes out as it

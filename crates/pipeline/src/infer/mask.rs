@@ -75,8 +75,8 @@ impl MaskModel {
     ///
     /// # Errors
     /// See [`ImprintError`].
-    pub fn contact(&mut self, imprint: &DepthMap, probability: Option<f32>) -> Result<ContactMask, ImprintError> {
-        let least = probability.unwrap_or(self.least_probability());
+    pub fn contact(&mut self, imprint: &DepthMap) -> Result<ContactMask, ImprintError> {
+        let least = self.least_probability();
         Ok(contact_of(&self.probability(imprint)?, imprint, least))
     }
 

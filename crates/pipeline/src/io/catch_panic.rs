@@ -1,6 +1,12 @@
 //! Panics that become errors: a pair, a job or a thread that fails costs itself and never the run.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// A lock that a caught panic did not make unusable.
+pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 /// Runs `work`; where it panics, what the panic said.
 ///

@@ -26,7 +26,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use touch2touch_core::dataset::{Index, PairEntry, PairId, Problem};
-use touch2touch_core::grid::{DepthMap, Grid};
+use touch2touch_core::grid::Grid;
 use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::read_as::ReadAs;
 use touch2touch_core::rig::{PerPad, Rig};
@@ -294,7 +294,7 @@ impl Dataset {
                 return Ok(loaded);
             }
             let file = self.pair_files(id).pop().unwrap_or_default();
-            plausible::notes(&mut loaded, &file);
+            plausible::notes(&mut loaded, &file, "bubble_imprint", true);
             self.lend_cameras(&mut loaded.sample);
             Ok(loaded)
         })
@@ -378,14 +378,6 @@ impl Dataset {
     pub fn gelslim_is_clipped(&self, id: PairId) -> Result<Option<bool>, FileError> {
         let Some(Files::Pictures(touch)) = self.files.get(id.0 as usize) else { return Ok(None) };
         self.catch_panic(id, || touch.is_clipped())
-    }
-
-    /// [`Dataset::vqvae_tile`] brought to meters, raw orientation and 175 x 140 px, as the measured imprint is.
-    ///
-    /// # Errors
-    /// As [`Dataset::load`].
-    pub fn vqvae_imprint(&self, id: PairId, laid: Turn) -> Result<Option<DepthMap>, FileError> {
-        Ok(self.vqvae_tile(id, laid)?.map(|tile| pictures::imprint_from_tile(&tile, &self.rig)))
     }
 }
 

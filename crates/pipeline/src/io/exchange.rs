@@ -116,6 +116,7 @@ pub struct ExportChoice {
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct ExportReport {
     /// Masks in train, val and test.
+    #[serde(skip)]
     pub counts: [usize; 3],
     /// Pixels below or above the range of the image; they were limited to it. None where there is no image.
     pub out_of_range_px: usize,

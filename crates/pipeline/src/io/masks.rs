@@ -134,7 +134,7 @@ struct PredictedFile {
 
 #[derive(Serialize, Deserialize)]
 struct PredictedMask {
-    of: String,
+    of: PredictedId,
     person: String,
     saved_unix_s: u64,
     #[serde(flatten)]
@@ -234,13 +234,13 @@ impl MaskStore {
         &self.rig
     }
 
-    fn mask_name(&self, pair: &str, finger: PadId) -> String {
-        format!("{}.{}{MASK_SUFFIX}", names::label(pair), self.rig.pad_key(finger))
+    fn mask_name(&self, pair: &str, finger: PadId, suffix: &str) -> String {
+        format!("{}.{}{suffix}", names::label(pair), self.rig.pad_key(finger))
     }
 
     /// The file of a mask, whether it exists or not.
     pub fn mask_file(&self, pair: &str, finger: PadId) -> PathBuf {
-        self.folder.join(self.mask_name(pair, finger))
+        self.folder.join(self.mask_name(pair, finger, MASK_SUFFIX))
     }
 
     /// Reads a mask; `None` if none was saved.
@@ -248,10 +248,8 @@ impl MaskStore {
     /// # Errors
     /// [`FileError`]: then the pair must not be edited.
     pub fn load(&self, pair: &str, finger: PadId) -> Result<Option<StoredMask>, FileError> {
-        match self.find(&self.mask_name(pair, finger))? {
-            Some((file, bytes)) => parse_mask(&file, &bytes, pair, &self.rig.pad_key(finger)).map(Some),
-            None => Ok(None),
-        }
+        let Some((file, bytes)) = self.find(&self.mask_name(pair, finger, MASK_SUFFIX))? else { return Ok(None) };
+        parse_mask(&file, &bytes, pair, &self.rig.pad_key(finger)).map(Some)
     }
 
     /// Saves a mask; `None` removes the file (undo back to "never corrected").
@@ -284,16 +282,14 @@ impl MaskStore {
         self.write(&file, &content)
     }
 
-    fn predicted_name(&self, pair: &str, finger: PadId) -> String {
-        format!("{}.{}{PREDICTED_SUFFIX}", names::label(pair), self.rig.pad_key(finger))
-    }
-
     /// Reads the masks drawn on predictions of a finger, with what each prediction is.
     ///
     /// # Errors
     /// As [`MaskStore::load`].
     pub fn load_predicted(&self, pair: &str, finger: PadId) -> Result<Vec<(PredictedId, StoredMask)>, FileError> {
-        let Some((file, bytes)) = self.find(&self.predicted_name(pair, finger))? else { return Ok(Vec::new()) };
+        let Some((file, bytes)) = self.find(&self.mask_name(pair, finger, PREDICTED_SUFFIX))? else {
+            return Ok(Vec::new());
+        };
         let damaged = |reason: String| damaged(&file, &reason);
         let content: PredictedFile = serde_json::from_slice(&bytes).map_err(|err| damaged(err.to_string()))?;
         check_format(&file, &content.format, PREDICTED_FORMAT, content.version, MASK_VERSION..=MASK_VERSION)?;
@@ -302,7 +298,7 @@ impl MaskStore {
         }
         let stored = |PredictedMask { of, person, saved_unix_s, mask }| {
             let (mask, marks) = mask.unpack().map_err(|err| damaged(err.to_string()))?;
-            Ok((of.into(), StoredMask { mask, marks, person, saved_unix_s }))
+            Ok((of, StoredMask { mask, marks, person, saved_unix_s }))
         };
         content.masks.into_iter().map(stored).collect()
     }
@@ -321,12 +317,12 @@ impl MaskStore {
         let mut all = self.load_predicted(pair, finger)?;
         all.retain(|(other, _)| other != of);
         all.extend(mask.map(|mask| (of.clone(), mask.clone())));
-        let file = self.folder.join(self.predicted_name(pair, finger));
+        let file = self.folder.join(self.mask_name(pair, finger, PREDICTED_SUFFIX));
         if all.is_empty() && !file.exists() {
             return Ok(());
         }
         let one = |(of, stored): (PredictedId, StoredMask)| PredictedMask {
-            of: of.into(),
+            of,
             mask: PackedMask::pack(&stored.mask, &stored.marks),
             person: stored.person,
             saved_unix_s: stored.saved_unix_s,
@@ -346,16 +342,12 @@ impl MaskStore {
     /// # Errors
     /// As [`MaskStore::load`].
     pub fn load_review(&self, pair: &str) -> Result<Option<StoredReview>, FileError> {
-        match self.find(&review_name(pair))? {
-            Some((file, bytes)) => parse_review(&file, &bytes).and_then(|content| {
-                if content.pair == pair {
-                    Ok(Some(content.review))
-                } else {
-                    Err(damaged(&file, &format!("it belongs to the pair {}", content.pair)))
-                }
-            }),
-            None => Ok(None),
+        let Some((file, bytes)) = self.find(&review_name(pair))? else { return Ok(None) };
+        let content = parse_review(&file, &bytes)?;
+        if content.pair != pair {
+            return Err(damaged(&file, &format!("it belongs to the pair {}", content.pair)));
         }
+        Ok(Some(content.review))
     }
 
     /// Saves the review state and accepted poses.

@@ -23,7 +23,7 @@ const UNNAMED: &str = r#"{
 ///
 /// A text that is not understood is kept as it is.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(from = "String", into = "String")]
+#[serde(transparent)]
 pub struct PredictedId(Arc<str>);
 
 impl PredictedId {
@@ -68,12 +68,6 @@ impl PredictedId {
 impl From<String> for PredictedId {
     fn from(text: String) -> Self {
         Self(text.into())
-    }
-}
-
-impl From<PredictedId> for String {
-    fn from(id: PredictedId) -> Self {
-        id.0.as_ref().to_owned()
     }
 }
 

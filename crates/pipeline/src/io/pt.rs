@@ -390,7 +390,7 @@ fn reach(shape: &[usize], strides: &[usize]) -> usize {
 }
 
 /// The values of a view in row-major order, each of `size` bytes.
-fn gathered(bytes: &[u8], size: usize, shape: &[usize], strides: &[usize]) -> Vec<u8> {
+pub(super) fn gathered(bytes: &[u8], size: usize, shape: &[usize], strides: &[usize]) -> Vec<u8> {
     let mut out = Vec::with_capacity(product(shape) * size);
     if shape.contains(&0) {
         return out;
@@ -418,14 +418,7 @@ fn gathered(bytes: &[u8], size: usize, shape: &[usize], strides: &[usize]) -> Ve
 
 /// Splits `bytes` into arrays of `N`.
 pub(super) fn each<const N: usize, T>(bytes: &[u8], f: impl Fn([u8; N]) -> T) -> Vec<T> {
-    bytes
-        .chunks_exact(N)
-        .map(|chunk| {
-            let mut array = [0; N];
-            array.copy_from_slice(chunk);
-            f(array)
-        })
-        .collect()
+    bytes.as_chunks().0.iter().map(|chunk| f(*chunk)).collect()
 }
 
 /// Turns bytes of a storage into values.

@@ -261,26 +261,22 @@ pub(super) fn fold<'a>(lines: impl Iterator<Item = &'a [u8]>, labels: &PairLabel
             None => from.retain(|other| !other.change.overlaps(&past.change)),
         }
     }
-    // From the last one back: each must begin where the one before it ended.
-    let mut now = labels.clone();
-    let kept = done.iter().rev().take_while(|past| {
-        let fits = past.change.leads_to(&now);
-        if fits {
-            past.change.clone().inverse().apply_to(&mut now);
-        }
-        fits
-    });
-    let first = done.len() - kept.count();
-    done.drain(..first);
-    let mut now = labels.clone();
-    let kept = undone.iter().rev().take_while(|past| {
-        let fits = past.change.clone().inverse().leads_to(&now);
-        if fits {
-            past.change.apply_to(&mut now);
-        }
-        fits
-    });
-    let first = undone.len() - kept.count();
-    undone.drain(..first);
+    // From the last one back: each must begin where the one before it ended. `made` has the change that was made last: of what
+    // was undone, the inverse.
+    let keep_fitting = |pasts: &mut Vec<Past>, made: fn(Change) -> Change| {
+        let mut now = labels.clone();
+        let kept = pasts.iter().rev().take_while(|past| {
+            let change = made(past.change.clone());
+            let fits = change.leads_to(&now);
+            if fits {
+                change.inverse().apply_to(&mut now);
+            }
+            fits
+        });
+        let first = pasts.len() - kept.count();
+        pasts.drain(..first);
+    };
+    keep_fitting(&mut done, |change| change);
+    keep_fitting(&mut undone, Change::inverse);
     JournalHistory { done, undone, problem: None }
 }

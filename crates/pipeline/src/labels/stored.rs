@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use super::accepted::{by_imprint, of_imprints};
 use super::{
@@ -10,6 +10,7 @@ use super::{
     note,
 };
 use crate::error::{TaskError, TaskErrorKind};
+use crate::io::catch_panic::lock;
 use crate::io::dataset::Dataset;
 use crate::io::error::{FileError, FileErrorKind};
 use crate::io::masks::{self, MaskStore, StoredMask, StoredReview};
@@ -23,10 +24,6 @@ pub struct Labels {
     /// Labels that whoever saves here holds, as far as they were read or given here: only differences are written, over
     /// what somebody else may have written meanwhile.
     saved: Arc<Mutex<BTreeMap<String, PairLabels>>>,
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 fn hand_of(stored: StoredMask) -> DrawnMask {

@@ -192,7 +192,7 @@ impl TrainPlan {
             counted(pairs, "pair")
         ));
         lines.extend(self.left_out.iter().map(|(why, n)| format!("not used: {} {}", counted(*n, "pair"), why.text())));
-        lines.extend(self.unreadable.iter().map(|remark| format!("not used: {}: {}", remark.name, remark.why)));
+        lines.extend(self.unreadable.iter().map(|remark| format!("not used: {remark}")));
         lines
     }
 

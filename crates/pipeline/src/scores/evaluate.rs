@@ -7,7 +7,7 @@ mod load;
 mod methods;
 mod tool;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::time::Instant;
 
 use serde::Serialize;
@@ -226,13 +226,4 @@ pub fn evaluate(
 struct ToolWork {
     tool: Option<String>,
     ids: Vec<PairId>,
-}
-
-/// The pairs by tool, in the order of the index.
-fn by_tool(dataset: &Dataset) -> BTreeMap<Option<String>, Vec<PairId>> {
-    let mut tools: BTreeMap<Option<String>, Vec<PairId>> = BTreeMap::new();
-    for (id, entry) in (0u32..).zip(&dataset.index.pairs) {
-        tools.entry(entry.tool.clone()).or_default().push(PairId(id));
-    }
-    tools
 }

@@ -6,7 +6,7 @@ use crate::error::TaskError;
 use crate::io::masks::now_unix_s;
 use crate::io::statistics::{Provenance, ShiftStatistics, utc_text};
 use crate::job::JobCx;
-use crate::steps::models::{GenerateInput, Models};
+use crate::steps::models::Models;
 use crate::steps::recipe::Recipe;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::postprocess::{ShiftFit, ShiftMode};
@@ -65,17 +65,14 @@ pub fn statistics(
             let bubble = sample.pad(*finger).and_then(|touch| touch.depth());
             let (Some(picture), Some(bubble)) = (generating.picture(&sample, *finger)?, bubble) else { continue };
             cx.check(WHAT)?;
-            let input = GenerateInput { difference: &picture, seed: generating.config.seed, size: [0, 0] };
-            let added = models
-                .predict(generating.bundle, generating.engine, generating.config, &[input], &quiet)
-                .and_then(|predictions| {
-                    let prediction = predictions
-                        .first()
-                        .ok_or_else(|| TaskError::new(WHAT, "the generator returned no prediction"))?;
-                    let chain = crate::steps::imprint::chain(prediction, ShiftMode::Raw)?;
-                    engine.clone_from(&prediction.engine);
-                    fit.add(&chain, &prediction.raw, &bubble.imprint).map_err(|err| TaskError::from_error(WHAT, &err))
-                });
+            let added = generating.of(models, &[picture], &quiet).and_then(|predictions| {
+                let prediction = predictions.first();
+                let prediction =
+                    prediction.ok_or_else(|| TaskError::new(WHAT, "the generator returned no prediction"))?;
+                let chain = crate::steps::imprint::chain(prediction, ShiftMode::Raw)?;
+                engine.clone_from(&prediction.engine);
+                fit.add(&chain, &prediction.raw, &bubble.imprint).map_err(|err| TaskError::from_error(WHAT, &err))
+            });
             match added {
                 Ok(()) => {}
                 Err(err) if err.is_cancelled() => return Err(TaskError::cancelled(WHAT)),

@@ -39,10 +39,7 @@ impl Clouds {
 
     /// The contact points of both fingers, right first: what is registered.
     pub fn contact_points(&self) -> Vec<DVec3> {
-        let fingers = self.fingers.iter().flatten();
-        fingers
-            .flat_map(|f| f.points.iter().zip(&f.contact).filter(|(_, contact)| **contact).map(|(p, _)| *p))
-            .collect()
+        self.fingers.iter().flatten().flat_map(FingerCloud::contact_points).collect()
     }
 
     /// Bytes held.
@@ -52,6 +49,11 @@ impl Clouds {
 }
 
 impl FingerCloud {
+    /// The points in contact.
+    pub fn contact_points(&self) -> impl Iterator<Item = DVec3> {
+        self.points.iter().zip(&self.contact).filter(|(_, contact)| **contact).map(|(point, _)| *point)
+    }
+
     /// The index of the point at a raw bubble pixel. Points are in row order, so this is a binary search.
     pub fn at_pixel(&self, x: usize, y: usize) -> Option<usize> {
         self.pixels.binary_search_by_key(&(y, x), |p| (p[1].into(), p[0].into())).ok()

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use strum::IntoEnumIterator as _;
 
@@ -14,7 +14,7 @@ use crate::infer::generator::{GenerateError, Generator, Item, Observer};
 use crate::infer::kept_key::{KeptKey, input_digest};
 use crate::infer::mask::{ImprintError, MaskModel};
 use crate::infer::store::Store;
-use crate::io::catch_panic::catch_panic;
+use crate::io::catch_panic::{catch_panic, lock};
 use crate::job::{JobCx, PreviewPicture};
 use crate::steps::bundles::{BundleInfo, BundleKind, by_id};
 use crate::steps::imprint::in_meters;
@@ -39,6 +39,17 @@ pub struct GenerateInput<'a> {
     pub size: [usize; 2],
 }
 
+/// A generator, the engine that runs it, and its choices.
+#[derive(Clone, Copy, Debug)]
+pub struct Generating<'a> {
+    /// The bundle.
+    pub bundle: &'a BundleInfo,
+    /// The engine.
+    pub engine: EngineChoice,
+    /// The choices.
+    pub config: &'a GenerateConfig,
+}
+
 /// A prediction from the disk, with the choices that made it.
 #[derive(Clone, Debug)]
 pub struct KeptPrediction {
@@ -60,10 +71,6 @@ pub struct Models {
     generator: Mutex<Loaded<Generator>>,
     mask_model: Mutex<Loaded<MaskModel>>,
     outputs: Mutex<BTreeMap<Arc<str>, OutputChains>>,
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Runs what holds a model's lock while the engine computes. A thread of a pool takes on other work of the pool while it
@@ -182,28 +189,24 @@ impl Models {
     /// If the model cannot be loaded or run, the choices are not for this bundle, or the job was told to stop.
     pub fn predict(
         &self,
-        bundle: &BundleInfo,
-        engine: EngineChoice,
-        config: &GenerateConfig,
+        generating: Generating<'_>,
         wanted: &[GenerateInput<'_>],
         cx: &JobCx,
     ) -> Result<Vec<Prediction>, TaskError> {
-        self.make(self.store.as_ref(), bundle, engine, config, wanted, cx)
+        self.make(self.store.as_ref(), generating, wanted, cx)
     }
 
     /// Predictions, where a picture that fails, or makes a model panic, does not take the others with it. `None` once
     /// told to stop.
     pub(crate) fn predict_each(
         &self,
-        bundle: &BundleInfo,
-        engine: EngineChoice,
-        config: &GenerateConfig,
+        generating: Generating<'_>,
         wanted: &[GenerateInput<'_>],
         cx: &JobCx,
     ) -> Option<Vec<Result<Prediction, TaskError>>> {
-        let what = || format!("Generate with {}", bundle.name);
+        let what = || format!("Generate with {}", generating.bundle.name);
         let run = |wanted: &[GenerateInput<'_>]| {
-            let predict = || self.predict(bundle, engine, config, wanted, cx);
+            let predict = || self.predict(generating, wanted, cx);
             catch_panic(predict).unwrap_or_else(|message| Err(TaskError::panicked(what(), &message)))
         };
         let one = |wanted: &GenerateInput<'_>| {
@@ -221,12 +224,11 @@ impl Models {
     fn make(
         &self,
         store: Option<&Mutex<Store>>,
-        bundle: &BundleInfo,
-        engine: EngineChoice,
-        config: &GenerateConfig,
+        generating: Generating<'_>,
         wanted: &[GenerateInput<'_>],
         cx: &JobCx,
     ) -> Result<Vec<Prediction>, TaskError> {
+        let Generating { bundle, engine, config } = generating;
         let what = format!("Generate with {}", bundle.name);
         let fail = |err: GenerateError| match err {
             GenerateError::Cancelled => TaskError::cancelled(&what),
@@ -307,18 +309,14 @@ impl Models {
     ///
     /// # Errors
     /// As [`Self::predict`].
-    pub fn warm_up(
-        &self,
-        bundle: &BundleInfo,
-        engine: EngineChoice,
-        config: &GenerateConfig,
-    ) -> Result<Prediction, TaskError> {
+    pub fn warm_up(&self, generating: Generating<'_>) -> Result<Prediction, TaskError> {
+        let Generating { bundle, config, .. } = generating;
         let [width, height] = self.outputs(bundle)?.input;
         let blank = RgbGrid::filled(width, height, [0.0; 3]);
         // Both fingers of a grasp go through the model together.
         let item = |seed| GenerateInput { difference: &blank, seed, size: [0, 0] };
         let both = [item(config.seed), item(config.seed.wrapping_add(1))];
-        let made = self.make(None, bundle, engine, config, &both, &JobCx::unwatched())?.pop();
+        let made = self.make(None, generating, &both, &JobCx::unwatched())?.pop();
         made.ok_or_else(|| TaskError::new(format!("Generate with {}", bundle.name), "the model returned nothing"))
     }
 
@@ -344,8 +342,7 @@ impl Models {
         kept
     }
 
-    /// Contact mask by the mask model for an imprint in meters, with what it is made of in the end. A pixel of at least
-    /// `probability` is contact; `None` for the bundle's own.
+    /// Contact mask by the mask model for an imprint in meters, with what it is made of in the end.
     ///
     /// # Errors
     /// If the model cannot be loaded or run.
@@ -354,9 +351,8 @@ impl Models {
         bundle: &BundleInfo,
         engine: EngineChoice,
         imprint: &DepthMap,
-        probability: Option<f32>,
     ) -> Result<ContactMask, TaskError> {
-        self.with_mask_model(bundle, engine, |model| model.contact(imprint, probability))
+        self.with_mask_model(bundle, engine, |model| model.contact(imprint))
     }
 
     /// The mask model's probability of contact at each pixel of its own grid, and from which on it calls that contact.

@@ -3,27 +3,14 @@
 use std::borrow::Cow;
 
 use crate::error::TaskError;
-use crate::infer::engine::EngineChoice;
 use crate::job::JobCx;
-use crate::steps::bundles::BundleInfo;
+pub use crate::steps::models::Generating;
 use crate::steps::models::{GenerateInput, Models};
 use crate::steps::on_pad::OnPad;
 use crate::steps::prediction::Prediction;
-use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::grid::RgbGrid;
 use touch2touch_core::rig::{PadId, PerPad, Rig, SensorId};
 use touch2touch_core::sample::Sample;
-
-/// A generator, the engine that runs it, and its choices.
-#[derive(Clone, Copy, Debug)]
-pub struct Generating<'a> {
-    /// The bundle.
-    pub bundle: &'a BundleInfo,
-    /// The engine.
-    pub engine: EngineChoice,
-    /// The choices.
-    pub config: &'a GenerateConfig,
-}
 
 /// The predictions of a pair's pads, or why a pad has none.
 pub type Predicted = PerPad<Result<Prediction, TaskError>>;
@@ -68,7 +55,7 @@ impl Generating<'_> {
     ) -> Result<Vec<Prediction>, TaskError> {
         let picture = self.picture(sample, pad)?.ok_or_else(|| self.no_input(&sample.rig))?;
         let wanted = |&seed: &u64| GenerateInput { difference: &picture, seed, size: [0, 0] };
-        models.predict(self.bundle, self.engine, self.config, &seeds.iter().map(wanted).collect::<Vec<_>>(), cx)
+        models.predict(self, &seeds.iter().map(wanted).collect::<Vec<_>>(), cx)
     }
 
     /// The predictions of pictures that it starts from, in their order.
@@ -77,10 +64,10 @@ impl Generating<'_> {
     /// As [`Models::predict`].
     pub fn of(self, models: &Models, pictures: &[Cow<'_, RgbGrid>], cx: &JobCx) -> Result<Vec<Prediction>, TaskError> {
         let wanted: Vec<_> = pictures.iter().map(|picture| self.starting_from(picture)).collect();
-        models.predict(self.bundle, self.engine, self.config, &wanted, cx)
+        models.predict(self, &wanted, cx)
     }
 
-    fn starting_from(self, difference: &RgbGrid) -> GenerateInput<'_> {
+    pub(crate) fn starting_from(self, difference: &RgbGrid) -> GenerateInput<'_> {
         GenerateInput { difference, seed: self.config.seed, size: [0, 0] }
     }
 
@@ -113,7 +100,7 @@ impl Generating<'_> {
             .iter()
             .map(|(_, picture, size)| GenerateInput { size: *size, ..self.starting_from(picture) })
             .collect();
-        let made = models.predict(self.bundle, self.engine, self.config, &wanted, cx)?;
+        let made = models.predict(self, &wanted, cx)?;
         let mut out = PerPad::default();
         for ((pad, ..), made) in pictures.iter().zip(made) {
             out[*pad] = Some(made);
@@ -133,9 +120,7 @@ impl Generating<'_> {
             pictures.extend(sample.pads.entries().filter_map(|(pad, touch)| Some((at, pad, touch.picture(input)?))));
         }
         let wanted: Vec<_> = pictures.iter().map(|(.., picture)| self.starting_from(picture)).collect();
-        let Some(made) = models.predict_each(self.bundle, self.engine, self.config, &wanted, cx) else {
-            return Ok(None);
-        };
+        let Some(made) = models.predict_each(self, &wanted, cx) else { return Ok(None) };
         let mut out: Vec<_> = samples.iter().map(|_| PerPad::default()).collect();
         for ((at, pad, _), made) in pictures.iter().zip(made) {
             out[*at][*pad] = Some(made);

@@ -208,9 +208,7 @@ impl Recipe {
             engine: if predicted || unet { self.engine } else { from.engine },
         }
     }
-}
 
-impl Recipe {
     /// The identity of the result of a stage, of any touch.
     pub fn id(&self, stage: Stage) -> RecipeId {
         let of = self.until(stage);

@@ -174,9 +174,6 @@ pub fn in_space(
         let recipe = Recipe { imprint: source, ..recipe.clone() };
         let estimate = Estimate::new(&recipe).with_surface().reach(touch, Stage::Pose, models, cx)?;
         let clouds = estimate.surface();
-        let contact = |f: &crate::steps::cloud::FingerCloud| {
-            f.points.iter().zip(&f.contact).filter(|(_, contact)| **contact).map(|(p, _)| *p).collect::<Arc<[DVec3]>>()
-        };
         let mut membranes = PerPad::default();
         for (pad, imprint) in estimate.imprints.entries() {
             let camera = sample.pad(pad).and_then(|touch| touch.camera());
@@ -186,7 +183,7 @@ pub fn in_space(
         let apart = pose.as_ref().zip(tool.as_ref().ok()).filter(|_| distance_m.is_some());
         let deviation = apart.map(|(pose, tool)| deviation(clouds, tool, pose.grasp_from_object));
         notes.push(side_note(&recipe, pose.as_ref()));
-        let contact = clouds.fingers.as_ref().map(|cloud| cloud.map(contact));
+        let contact = clouds.fingers.as_ref().map(|cloud| cloud.map(|cloud| cloud.contact_points().collect()));
         made.push(SpaceSide { source, contact, membranes, pose, deviation });
     }
     Ok(InSpace {

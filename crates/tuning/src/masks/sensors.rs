@@ -47,21 +47,6 @@ impl Default for Sensors {
 const SLOW: [usize; 2] = [5, 4];
 
 impl Sensors {
-    /// No variation at all.
-    pub fn none() -> Self {
-        Self {
-            shallowest: 1.0,
-            least_m: 0.0,
-            gain: 0.0,
-            level_m: 0.0,
-            distortion_m: 0.0,
-            grain_m: 0.0,
-            smoothed: 0.0,
-            shift_px: 0,
-            mirrored: false,
-        }
-    }
-
     /// A touch as another sensor would have felt it.
     pub(super) fn vary(&self, touch: &MaskTouch, size: [usize; 2], random: &mut Random) -> MaskTouch {
         // Everything is drawn in any case, so that one setting does not change what another one draws.
@@ -189,6 +174,21 @@ mod tests {
         Random::new(seed, Purpose::Variation, 0, 0)
     }
 
+    /// No variation at all.
+    fn unvaried() -> Sensors {
+        Sensors {
+            shallowest: 1.0,
+            least_m: 0.0,
+            gain: 0.0,
+            level_m: 0.0,
+            distortion_m: 0.0,
+            grain_m: 0.0,
+            smoothed: 0.0,
+            shift_px: 0,
+            mirrored: false,
+        }
+    }
+
     fn touch() -> MaskTouch {
         let contact: Vec<bool> = (0..54).map(|i| i == 21 || i == 22).collect();
         let mut imprint_m: Vec<f32> = contact.iter().map(|&c| if c { 0.01 } else { 0.0 }).collect();
@@ -203,12 +203,12 @@ mod tests {
 
     #[test]
     fn without_variation_a_touch_stays_as_it_is() {
-        assert!(same(&Sensors::none().vary(&touch(), SIZE, &mut random(1)), &touch()));
+        assert!(same(&unvaried().vary(&touch(), SIZE, &mut random(1)), &touch()));
     }
 
     #[test]
     fn the_mask_moves_with_the_imprint_and_what_comes_from_outside_does_not_count() {
-        let moving = Sensors { shift_px: 2, mirrored: true, ..Sensors::none() };
+        let moving = Sensors { shift_px: 2, mirrored: true, ..unvaried() };
         let mut moved = 0;
         for seed in 0..30 {
             let varied = moving.vary(&touch(), SIZE, &mut random(seed));
@@ -225,7 +225,7 @@ mod tests {
         }
         assert!(moved > 20);
         let ignored = MaskTouch { counted: Some((0..54).map(|i| i != 30).collect()), ..touch() };
-        let flips = Sensors { mirrored: true, ..Sensors::none() };
+        let flips = Sensors { mirrored: true, ..unvaried() };
         let varied = flips.vary(&ignored, SIZE, &mut random(5));
         assert_eq!(varied.counted.unwrap().iter().filter(|&&counts| !counts).count(), 1);
     }

@@ -1,6 +1,6 @@
 //! [`placed`]: a drawn picture as a pad's sensor sees it: through a line, moved, with a field on top.
 
-use crate::image::{Tap, shifted, taps};
+use crate::image::{Tap, across, shifted, taps};
 use crate::tape::Tensor;
 
 /// Pictures `[n, side, side]` through the line `[2]` (factor and offset), moved by their pad's shift (of `[pads, 2]`, rows
@@ -50,11 +50,6 @@ impl Place {
         let taps = |axis: usize| taps(side, f64::from(shifts[2 * pad + axis]));
         Self { side, rows: taps(0), columns: taps(1) }
     }
-
-    fn across(&self, image: &[f32]) -> Vec<f32> {
-        let rows = image.chunks_exact(self.side);
-        rows.flat_map(|row| self.columns.iter().map(|tap| tap.between(row[tap.low], row[tap.low + 1]))).collect()
-    }
 }
 
 /// Slopes along the inputs; that along the drawn pictures begins as the one along the result.
@@ -74,7 +69,7 @@ impl InputSlopes {
         field.iter_mut().zip(slope.iter()).for_each(|(field, slope)| *field += slope);
 
         let lined: Vec<f32> = drawn.iter().map(|v| v * line[0] + line[1]).collect();
-        let across = place.across(&lined);
+        let across = across(&lined, &place.columns);
         // Moving on by a shift reads further back: hence the minus.
         let mut along_across = vec![0.0; slope.len()];
         let mut down = 0.0f64;

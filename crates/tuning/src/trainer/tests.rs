@@ -16,12 +16,8 @@ impl Objective for Vector {
         (name == "vector").then_some(Rate { rate: 0.05, decay: 0.0, anchor: 0.0 })
     }
 
-    fn parts(&self, _: usize) -> usize {
-        4
-    }
-
-    fn part(&self, step: usize, part: usize) -> Vec<f32> {
-        Random::new(1, Purpose::Batch, step, part).normals(3)
+    fn part(&self, step: usize, places: Range<usize>) -> Vec<f32> {
+        Random::new(1, Purpose::Batch, step, places.start).normals(3)
     }
 
     fn loss(&self, leaves: &Leaves<'_>, part: Vec<f32>) -> Tensor {
@@ -41,7 +37,7 @@ fn trainer(threads: usize, steps: usize) -> Trainer<Vector> {
     let mut start = Params::default();
     start.push("vector", vec![3], vec![0.0; 3]);
     start.push("fixed", vec![2], vec![7.0; 2]);
-    Trainer::new(Vector, start, steps, Some(threads))
+    Trainer::new(Vector, start, 4, steps, Some(threads))
 }
 
 fn origin(name: &str) -> Origin {
@@ -53,9 +49,9 @@ fn any_objective_is_descended() {
     let mut trainer = trainer(2, 300);
     let mut losses: Vec<f32> = (0..300).map(|_| trainer.step().unwrap().loss).collect();
     assert!(losses.split_off(290).iter().sum::<f32>() < 1e-2 * losses[..10].iter().sum::<f32>());
-    let average = &trainer.average().get("vector").unwrap().values;
+    let average = &trainer.average.get("vector").unwrap().values;
     assert!(average.iter().zip(TRUTH).all(|(f, t)| (f - t).abs() < 0.02), "{average:?}");
-    assert_eq!(trainer.average().get("fixed").unwrap().values.as_slice(), [7.0; 2]);
+    assert_eq!(trainer.average.get("fixed").unwrap().values.as_slice(), [7.0; 2]);
     assert_eq!(trainer.step(), Err(Error::Done(300)));
 }
 
@@ -104,12 +100,8 @@ impl Objective for Broken {
         Some(Rate { rate: 0.1, decay: 0.0, anchor: 0.0 })
     }
 
-    fn parts(&self, _: usize) -> usize {
-        2
-    }
-
-    fn part(&self, step: usize, part: usize) -> f32 {
-        if (step, part) == (2, 1) { f32::NAN } else { 1.0 }
+    fn part(&self, step: usize, places: Range<usize>) -> f32 {
+        if (step, places.start) == (2, 1) { f32::NAN } else { 1.0 }
     }
 
     fn loss(&self, leaves: &Leaves<'_>, part: f32) -> Tensor {
@@ -122,7 +114,7 @@ impl Objective for Broken {
 fn a_loss_that_is_no_number_leaves_the_weights_alone() {
     let mut start = Params::default();
     start.push("x", vec![1], vec![1.0]);
-    let mut trainer = Trainer::new(Broken, start, 9, Some(2));
+    let mut trainer = Trainer::new(Broken, start, 2, 9, Some(2));
     for _ in 0..2 {
         trainer.step().unwrap();
     }

@@ -39,14 +39,10 @@ pub(super) fn worth(cx: &mut Cx<'_>, ui: &mut Ui) {
 
 /// The invitation to a first fit.
 pub(super) fn nothing_yet(cx: &mut Cx<'_>, ui: &mut Ui, begun: bool) {
-    let (what, why) = match cx
-        .state
-        .tasks
-        .of_kind(TaskKind::Learn)
-        .filter(|_| cx.state.learn.started == Network::Generator)
-    {
-        Some(_) => ("Scores appear when the fit is done", ""),
-        None => (
+    let fitting = cx.state.tasks.of_kind(TaskKind::Learn).is_some() && cx.state.learn.started == Network::Generator;
+    let (what, why) = match fitting {
+        true => ("Scores appear when the fit is done", ""),
+        false => (
             "Shipped model in use, trained on simulated touches",
             "A few pairs of your own sensors are enough to fit the model to their alignment, scale and pattern. It takes \
              seconds, and the score is on pairs that were left out",
@@ -214,7 +210,7 @@ fn remarks(cx: &Cx<'_>, ui: &mut Ui, adapted: &Adapted) {
         ui.add_space(8.0);
         ui.label(section(heading, cx.p));
         for remark in remarks {
-            ui.add(egui::Label::new(format!("{}: {}", remark.name, remark.why)).wrap());
+            ui.add(egui::Label::new(remark.to_string()).wrap());
         }
     };
     list("Pairs that disagree with the others", &adapted.doubtful);

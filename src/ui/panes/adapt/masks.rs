@@ -124,7 +124,7 @@ pub(super) fn worth(cx: &mut Cx<'_>, ui: &mut Ui, trained: &Trained) {
         say(warning.clone(), cx.p.caution);
     }
     for remark in &trained.unusable {
-        say(format!("not used: {}: {}", remark.name, remark.why), cx.p.caution);
+        say(format!("not used: {remark}"), cx.p.caution);
     }
     for (worth, when) in trained.poses.iter().flatten().zip(["before", "after"]) {
         say(format!("{when}: {} on {}", worth.text(), counted(worth.grasps, "grasp")), cx.p.text);

@@ -41,7 +41,7 @@ pub(super) fn mask(
     }
     if let Some(ignored) = results::drawn_mask(cx.state, source, finger).and_then(|hand| hand.marks.ignored()) {
         let slot = ("ignored", source, finger);
-        let veil = || (mask_image(ignored, Color32::WHITE), None);
+        let veil = || (mask_image(ignored), None);
         let picture = cx.shared.textures.get(ui.ctx(), slot, &key, true, veil);
         output.paint(picture.texture.id(), IGNORED.gamma_multiply(settings.mask_opacity));
         let segments = memory.outlines.get(&("ignored", source, finger), &key, || outline(ignored));
@@ -50,7 +50,7 @@ pub(super) fn mask(
     if let Some(proposal) = results::shown_proposal(cx.state, source, finger) {
         let key = results::proposal_key(cx.state, source, finger).ok();
         let slot = ("proposal", source, finger);
-        let veil = || (mask_image(&proposal.mask, Color32::WHITE), None);
+        let veil = || (mask_image(&proposal.mask), None);
         let picture = cx.shared.textures.get(ui.ctx(), slot, &key, true, veil);
         output.paint(picture.texture.id(), PROPOSED.gamma_multiply(0.6 * settings.mask_opacity));
         let segments = memory.outlines.get(&slot, &key, || outline(&proposal.mask));

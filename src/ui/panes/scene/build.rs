@@ -52,9 +52,7 @@ pub(super) struct SceneMesh {
 /// Brings what a view draws up to date: points for the renderer are made again only for another cloud.
 pub(super) fn update(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource) {
     let state = cx.state;
-    let contact = |f: &FingerCloud| {
-        f.points.iter().zip(&f.contact).filter(|(_, contact)| **contact).map(|(point, _)| *point).collect()
-    };
+    let contact = |cloud: &FingerCloud| cloud.contact_points().collect();
     for side in std::iter::once(source).chain(state.workbench.both_clouds.then(|| source.other())) {
         let (Lookup::Ready(clouds), Ok(Some(key))) = (results::cloud(state, side), results::cloud_key(state, side))
         else {

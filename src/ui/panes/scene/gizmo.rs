@@ -7,10 +7,11 @@ use eframe::egui::{PointerButton, Pos2, Shape, Stroke, Ui, vec2};
 use glam::{DVec2, DVec3};
 
 use super::Memory;
+use super::hands::held;
 use crate::app::command::Command;
 use crate::app::keys::ImprintSource;
 use crate::app::results;
-use crate::app::workbench::{SceneTool, WorkbenchCommand};
+use crate::app::workbench::WorkbenchCommand;
 use crate::gpu::guides::AXIS_COLORS;
 use crate::gpu::view::Camera;
 use crate::ui::parts::cx::Cx;
@@ -148,15 +149,12 @@ fn dragged(camera: &Camera, size: [u32; 2], from: PlanarPose, handle: Handle, be
 
 /// Follows the pointer and paints the handles.
 pub(super) fn show(cx: &mut Cx<'_>, ui: &Ui, memory: &mut Memory, source: ImprintSource, output: &SceneOutput) {
-    let bench = &cx.state.workbench;
-    let elsewhere = bench.hand.as_ref().is_some_and(|hand| hand.source != source);
-    if bench.tool != SceneTool::Pose || elsewhere || results::tool(cx.state).ready().is_none() {
+    let Some(pose) = held(cx.state, source).filter(|_| results::tool(cx.state).ready().is_some()) else {
         if memory.gizmo.holds(source) {
             memory.gizmo = Gizmo::default();
         }
         return;
-    }
-    let pose = bench.hand(source).map_or_else(|| results::manual_begins(cx.state, source), |hand| hand.pose);
+    };
     let camera = memory.views[source as usize].camera;
     let ppp = ui.pixels_per_point();
     let Some(placed) = place(&camera, output, ppp, pose) else { return };

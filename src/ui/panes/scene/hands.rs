@@ -16,7 +16,7 @@ use touch2touch_core::units;
 const KEYS: &str = "arrow keys 0.1 mm · Alt + Left, Right 0.5° · Shift ×10 · Ctrl ÷10";
 
 /// The pose that a hand holds on a side, or would hold.
-fn held(state: &State, source: ImprintSource) -> Option<PlanarPose> {
+pub(super) fn held(state: &State, source: ImprintSource) -> Option<PlanarPose> {
     let bench = &state.workbench;
     if bench.tool != SceneTool::Pose || bench.hand.as_ref().is_some_and(|hand| hand.source != source) {
         return None;

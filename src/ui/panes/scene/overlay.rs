@@ -98,13 +98,9 @@ pub(crate) fn pose_details(pose: &PoseResult) -> String {
 }
 
 fn axes_and_scale(p: &Palette, painter: &egui::Painter, camera: &Camera, output: &SceneOutput, rect: Rect) {
-    for (axis, name, color) in [
-        (DVec3::X, "x", guides::AXIS_COLORS[0]),
-        (DVec3::Y, "y", guides::AXIS_COLORS[1]),
-        (DVec3::Z, "z", guides::AXIS_COLORS[2]),
-    ] {
+    for ((axis, name), [r, g, b, _]) in DVec3::AXES.into_iter().zip(["x", "y", "z"]).zip(guides::AXIS_COLORS) {
         if let Some(tip) = output.on_screen(camera, items::axes_origin() + axis * (items::AXIS_M * 1.25)) {
-            let color = Color32::from_rgb(color[0], color[1], color[2]);
+            let color = Color32::from_rgb(r, g, b);
             painter.text(tip, Align2::CENTER_CENTER, name, FontId::proportional(11.0), color);
         }
     }

@@ -110,13 +110,8 @@ impl Colorbar<'_> {
             Color32::from_rgb(r, g, b)
         });
         if let Some(histogram) = self.histogram {
-            paint_histogram(
-                &painter,
-                histogram,
-                range,
-                Rect::from_min_max(rect.min, pos2(bar.right(), bar.top() - 1.0)),
-                p,
-            );
+            let above = Rect::from_min_max(rect.min, pos2(bar.right(), bar.top() - 1.0));
+            paint_histogram(&painter, histogram, range, above, p);
         }
         for v in range.ticks((width / 44.0) as usize) {
             let x = bar.left() + range.unit(v) * bar.width();
@@ -148,11 +143,8 @@ fn paint_histogram(painter: &egui::Painter, histogram: &Histogram, range: Range,
         let x = |v: f32| rect.left() + range.unit(v) * rect.width();
         let top = rect.bottom() - rect.height() * height(*n) / most;
         let right = x(b).max(x(a) + 1.0);
-        painter.rect_filled(
-            Rect::from_min_max(pos2(x(a), top), pos2(right, rect.bottom())),
-            0.0,
-            p.weak.gamma_multiply(0.6),
-        );
+        let bar = Rect::from_min_max(pos2(x(a), top), pos2(right, rect.bottom()));
+        painter.rect_filled(bar, 0.0, p.weak.gamma_multiply(0.6));
     }
 }
 

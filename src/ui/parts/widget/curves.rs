@@ -58,13 +58,8 @@ pub fn show(ui: &mut Ui, size: Vec2, heading: &str, curves: &[&Curve]) {
     }
     if let Some((_, curve, point)) = near {
         painter.circle_filled(place(point), 3.0, p.accent);
-        response.on_hover_text(format!(
-            "{}, step {:.0}: {} {}",
-            curve.name,
-            point[0],
-            number(point[1], span),
-            curve.unit
-        ));
+        let value = number(point[1], span);
+        response.on_hover_text(format!("{}, step {:.0}: {value} {}", curve.name, point[0], curve.unit));
     }
 }
 

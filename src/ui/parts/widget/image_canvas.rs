@@ -72,6 +72,12 @@ impl CanvasMap {
     pub(crate) fn pixel(&self, px: [f32; 2]) -> Option<(usize, usize)> {
         self.contains(px).then(|| (px[0].round().max(0.0) as usize, px[1].round().max(0.0) as usize))
     }
+
+    /// The corners of the texture at the corners of the image.
+    pub(crate) fn uv(&self) -> Rect {
+        let [from, to] = if self.rotated { [1.0, 0.0] } else { [0.0, 1.0] };
+        Rect::from_min_max(pos2(from, from), pos2(to, to))
+    }
 }
 
 /// Use of the primary button on a canvas.
@@ -171,12 +177,7 @@ pub(crate) fn shows_squares(map: &CanvasMap, pixels_per_point: f32) -> bool {
 impl CanvasOutput {
     /// Paints a texture over the whole image.
     pub(crate) fn paint(&self, texture: TextureId, tint: Color32) {
-        let uv = if self.map.rotated {
-            Rect::from_min_max(pos2(1.0, 1.0), pos2(0.0, 0.0))
-        } else {
-            Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0))
-        };
-        self.painter.image(texture, self.map.image_rect, uv, tint);
+        self.painter.image(texture, self.map.image_rect, self.map.uv(), tint);
     }
 
     /// Paints a cross-hair through an image position: thin, with a gap so that the pixel stays visible.

@@ -102,32 +102,24 @@ impl Textures {
         nearest: bool,
         make: impl FnOnce() -> (ColorImage, Option<Histogram>),
     ) -> &Picture {
-        let slot = hash(slot);
-        let key = hash((key, nearest));
-        let frame = self.frame;
+        let (slot, key) = (hash(slot), hash((key, nearest)));
         let options = if nearest { TextureOptions::NEAREST } else { TextureOptions::LINEAR };
-        let uploads = &mut self.uploads;
-        let picture = match self.slots.entry(slot) {
-            std::collections::btree_map::Entry::Vacant(entry) => {
-                *uploads += 1;
+        let picture = match self.slots.remove(&slot) {
+            Some(picture) if picture.key == key => picture,
+            old => {
+                self.uploads += 1;
                 let (image, histogram) = make();
-                let texture = ctx.load_texture("picture", image, options);
-                entry.insert(Picture { texture, histogram, key, used: frame })
-            }
-            std::collections::btree_map::Entry::Occupied(entry) => {
-                let picture = entry.into_mut();
-                if picture.key != key {
-                    *uploads += 1;
-                    let (image, histogram) = make();
-                    picture.texture.set(image, options);
-                    picture.histogram = histogram;
-                    picture.key = key;
-                }
-                picture
+                let texture = match old {
+                    Some(Picture { mut texture, .. }) => {
+                        texture.set(image, options);
+                        texture
+                    }
+                    None => ctx.load_texture("picture", image, options),
+                };
+                Picture { texture, histogram, key, used: self.frame }
             }
         };
-        picture.used = frame;
-        picture
+        self.slots.entry(slot).or_insert(Picture { used: self.frame, ..picture })
     }
 
     /// A mask as a white layer in `slot`: where one of the same size was there before, only the rectangle in which they
@@ -135,11 +127,11 @@ impl Textures {
     pub fn mask(&mut self, ctx: &Context, slot: impl Hash, key: impl Hash, mask: &Arc<Mask>) -> TextureId {
         let (slot, key) = (hash(slot), hash(key));
         let frame = self.frame;
-        let (options, white) = (TextureOptions::NEAREST, Color32::WHITE);
+        let options = TextureOptions::NEAREST;
         let held = self.masks.entry(slot).or_insert_with(|| {
             self.uploads += 1;
             self.uploaded_px += mask.len();
-            let texture = ctx.load_texture("mask", mask_image(mask, white), options);
+            let texture = ctx.load_texture("mask", mask_image(mask), options);
             MaskPicture { texture, mask: mask.clone(), key, used: frame }
         });
         held.used = frame;
@@ -148,12 +140,12 @@ impl Textures {
             if held.mask.size() != mask.size() {
                 self.uploads += 1;
                 self.uploaded_px += mask.len();
-                held.texture.set(mask_image(mask, white), options);
+                held.texture.set(mask_image(mask), options);
             } else if let Some(Rect { x, y, width, height }) = difference(&held.mask, mask) {
                 self.uploads += 1;
                 self.uploaded_px += width * height;
                 let part = Mask::from_fn(width, height, |dx, dy| mask[(x + dx, y + dy)]);
-                held.texture.set_partial([x, y], mask_image(&part, white), options);
+                held.texture.set_partial([x, y], mask_image(&part), options);
             }
             held.mask = mask.clone();
         }
@@ -185,16 +177,10 @@ impl<V> Memo<V> {
     /// The thing in `slot`; made with `make` if `key` changed.
     pub(crate) fn get(&mut self, slot: impl Hash, key: impl Hash, make: impl FnOnce() -> V) -> &V {
         let (slot, key) = (hash(slot), hash(key));
-        match self.slots.entry(slot) {
-            std::collections::btree_map::Entry::Vacant(entry) => &entry.insert((key, make())).1,
-            std::collections::btree_map::Entry::Occupied(entry) => {
-                let held = entry.into_mut();
-                if held.0 != key {
-                    *held = (key, make());
-                }
-                &held.1
-            }
+        if self.slots.get(&slot).is_none_or(|(held, _)| *held != key) {
+            self.slots.insert(slot, (key, make()));
         }
+        &self.slots[&slot].1
     }
 }
 
@@ -215,8 +201,8 @@ pub(crate) fn picture_image(picture: &Rgb8) -> ColorImage {
 }
 
 /// A mask as a transparent layer.
-pub(crate) fn mask_image(mask: &Mask, color: Color32) -> ColorImage {
-    let pixel = |on: &bool| if *on { color } else { Color32::TRANSPARENT };
+pub(crate) fn mask_image(mask: &Mask) -> ColorImage {
+    let pixel = |on: &bool| if *on { Color32::WHITE } else { Color32::TRANSPARENT };
     ColorImage::new(mask.size(), mask.as_slice().iter().map(pixel).collect())
 }
 

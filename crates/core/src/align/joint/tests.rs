@@ -295,7 +295,9 @@ fn a_place_open_along_the_tool_is_uncertain() {
     let (pose, evidence) = (report.grasp_from_object, report.evidence.unwrap());
     let mut graded = |along_m: f64, across_m: f64| {
         let uncertainty = spread_along(pose, [along_m, across_m]);
-        assert!((uncertainty.along_m(pose, DVec2::from_angle(pose.theta_rad)) - across_m).abs() < 1e-9);
+        let turn = DVec2::from_angle(pose.theta_rad);
+        let across = DVec2::from(uncertainty.half_axes(pose).map(|axis| axis.dot(turn)));
+        assert!((across.length() - across_m).abs() < 1e-9);
         report.evidence = Some(Evidence { uncertainty, ..evidence });
         Verdict::of(&report).unwrap()
     };

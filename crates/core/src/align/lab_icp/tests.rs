@@ -35,8 +35,7 @@ fn equals_the_numpy_twin_in_every_iteration() {
     for case in &cases {
         let starts: Vec<PlanarPose> =
             case.starts.iter().map(|&[theta_rad, y_m, z_m]| PlanarPose { theta_rad, y_m, z_m }).collect();
-        let config = LabIcpConfig { starts: starts.clone(), record: true };
-        let report = lab_icp(&meters(&case.scene), &LabModel::new(&meters(&case.model)), &config).unwrap();
+        let report = lab_icp(&meters(&case.scene), &LabModel::new(&meters(&case.model)), &starts, true).unwrap();
         for (run, poses) in case.poses.iter().enumerate() {
             assert_eq!(report.runs[run].start, starts[run]);
             for (&iteration, &pose) in case.iterations.iter().zip(poses) {

@@ -89,7 +89,7 @@ impl GeneratorSpec {
     }
 
     /// The steps from the decoder's picture to a color sensor's difference; `None` for a bundle that predicts depth.
-    pub(crate) fn color_chain(&self) -> Option<ColorChain> {
+    pub fn color_chain(&self) -> Option<ColorChain> {
         Some(ColorChain {
             range: self.output.range?,
             size: self.output.imprint_size,

@@ -60,7 +60,8 @@ fn open(path: &std::path::Path) -> Result<Environment, String> {
     opened.unwrap_or_else(|_| Err("it is not a usable ONNX Runtime".into()))
 }
 
-pub(super) fn library() -> Result<Library, Vec<Searched>> {
+/// The library of ONNX Runtime in use, loaded on the first call, or all the places that were searched in vain.
+pub(in crate::infer) fn library() -> Result<Library, Vec<Searched>> {
     match &*state() {
         State::Loaded { library, .. } => Ok(library.clone()),
         State::Absent(searched) => Err(searched.clone()),
@@ -122,7 +123,8 @@ fn is_in_the_library(provider: Provider) -> bool {
     found.unwrap_or(false)
 }
 
-pub(super) fn try_provider(provider: Provider) -> Result<(), NoProvider> {
+/// Starts a provider with a graph of one operator, once in a program's life.
+pub(in crate::infer) fn try_provider(provider: Provider) -> Result<(), NoProvider> {
     /// One operator, `y = max(x, 0)`: `onnx.helper.make_node("Relu", ["x"], ["y"])` in opset 17.
     const GRAPH: &[u8] = include_bytes!("probe.onnx");
     static TRIED: Mutex<BTreeMap<Provider, Result<(), NoProvider>>> = Mutex::new(BTreeMap::new());
@@ -140,17 +142,12 @@ pub(super) fn try_provider(provider: Provider) -> Result<(), NoProvider> {
         let said = match run {
             Ok(y) if y.data() == [0.0; 4] => return Ok(()),
             Ok(_) => "it computes wrong numbers".to_owned(),
-            Err(reason) => one_line(&reason),
+            // On one line: the library's words may go over many, with paths of its own source.
+            Err(reason) => reason.split_whitespace().collect::<Vec<_>>().join(" "),
         };
         Err(NoProvider::DoesNotStart { provider, said })
     };
     tried.entry(provider).or_insert_with(attempt).clone()
-}
-
-/// Words of the library, which may go over many lines with paths of its own source.
-fn one_line(said: &str) -> String {
-    let words: Vec<&str> = said.split_whitespace().collect();
-    words.join(" ")
 }
 
 impl Session for OnnxRuntimeSession {

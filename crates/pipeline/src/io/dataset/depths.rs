@@ -283,7 +283,7 @@ impl Row {
         let sample =
             Sample { rig: rig.clone(), pads: pads.map(Some).into(), grasp_from_object, notes, ..Sample::default() };
         let mut loaded = Loaded { sample, invalid: invalid.map(Some).into() };
-        plausible::notes_of(&mut loaded, rows.file(), depths.map_or(DEPTHS[0], |(key, _)| key), false);
+        plausible::notes(&mut loaded, rows.file(), depths.map_or(DEPTHS[0], |(key, _)| key), false);
         Ok(loaded)
     }
 

@@ -32,13 +32,9 @@ const MAX_OFFSET_M: f64 = 0.1;
 /// Pixels by which lifting and projecting again may miss.
 const ROUND_TRIP_PX: f64 = 1e-6;
 
-/// Adds to the sample's notes what cannot be right about it; `file` is its bubble's file.
-pub(super) fn notes(loaded: &mut Loaded, file: &Path) {
-    notes_of(loaded, file, "bubble_imprint", true);
-}
-
-/// [`notes`] of a sample whose imprints are stored under another key, with its cameras or, where they are assumed, without.
-pub(super) fn notes_of(loaded: &mut Loaded, file: &Path, key: &str, with_cameras: bool) {
+/// Adds to the sample's notes what cannot be right about it; `file` has its imprints, under `key`. With its cameras or, where they
+/// are assumed, without.
+pub(super) fn notes(loaded: &mut Loaded, file: &Path, key: &str, with_cameras: bool) {
     let mut problems = std::mem::take(&mut loaded.sample.notes);
     for (finger, touch) in loaded.sample.pads.entries() {
         let Some(bubble) = touch.depth() else { continue };

@@ -4,7 +4,7 @@
 
 use std::io::Read;
 
-use crate::io::pt::{Tensor, Values, each};
+use crate::io::pt::{Tensor, Values, each, gathered};
 
 const MAGIC: &[u8] = b"\x93NUMPY";
 /// numpy pads the header so that the values begin at a multiple of this.
@@ -139,6 +139,11 @@ impl Header {
         if big_endian {
             bytes.chunks_exact_mut(bytes_each).for_each(<[u8]>::reverse);
         }
+        if fortran {
+            // The first index runs fastest.
+            let strides = shape.iter().scan(1, |stride, n| Some(std::mem::replace(stride, *stride * n)));
+            bytes = gathered(&bytes, bytes_each, &shape, &strides.collect::<Vec<usize>>());
+        }
         let values = match (kind, bytes_each) {
             (Some('f'), 4) => Values::F32(each(&bytes, f32::from_le_bytes)),
             (Some('f'), _) => Values::F64(each(&bytes, f64::from_le_bytes)),
@@ -151,7 +156,6 @@ impl Header {
             (_, 4) => Values::I64(each(&bytes, |b| i64::from(i32::from_le_bytes(b)))),
             _ => Values::I64(each(&bytes, i64::from_le_bytes)),
         };
-        let values = if fortran && shape.len() > 1 { row_major(&shape, values) } else { values };
         Ok(Tensor { shape, values })
     }
 }
@@ -178,32 +182,6 @@ pub(super) fn bytes(shape: &[usize], values: &Values) -> Vec<u8> {
     out.extend(header.bytes());
     out.extend(values.bytes());
     out
-}
-
-/// Reorders values whose first index runs fastest.
-fn row_major(shape: &[usize], values: Values) -> Values {
-    fn reorder<T: Copy>(shape: &[usize], values: &[T]) -> Vec<T> {
-        let mut index = vec![0usize; shape.len()];
-        let mut out = Vec::with_capacity(values.len());
-        for _ in 0..values.len() {
-            let at = index.iter().zip(shape).rev().fold(0, |at, (&i, &n)| at * n + i);
-            out.push(values[at]);
-            for axis in (0..shape.len()).rev() {
-                index[axis] += 1;
-                if index[axis] < shape[axis] {
-                    break;
-                }
-                index[axis] = 0;
-            }
-        }
-        out
-    }
-    match values {
-        Values::F32(v) => Values::F32(reorder(shape, &v)),
-        Values::F64(v) => Values::F64(reorder(shape, &v)),
-        Values::U8(v) => Values::U8(reorder(shape, &v)),
-        Values::I64(v) => Values::I64(reorder(shape, &v)),
-    }
 }
 
 #[cfg(test)]

@@ -7,8 +7,7 @@ use crate::io::dataset::Dataset;
 use crate::job::JobCx;
 use crate::learn::usable::unusable;
 use crate::steps::imprint::{chain, window};
-use crate::steps::models::{GenerateInput, Models};
-use crate::steps::predict::Generating;
+use crate::steps::models::Models;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::findings::Findings;
 use touch2touch_core::fit::{FitPair, offsets};
@@ -82,13 +81,8 @@ pub(super) fn gather(
     models: &Models,
     cx: &JobCx,
 ) -> Result<Gathered, TaskError> {
-    let ends = setup
-        .recipe
-        .generating()?
-        .bundle
-        .ends(&dataset.rig)
-        .ok_or_else(|| TaskError::new(WHAT, "the bundle is not a generator"))?;
-    let input = ends.map_err(|err| TaskError::from_error(WHAT, &err))?.input;
+    let input = setup.recipe.generating()?.input(&dataset.rig);
+    let input = input.map_err(|err| TaskError { what: WHAT.into(), ..err })?;
     let (mut touches, mut left_out) = (Vec::new(), Vec::new());
     let mut notes = Findings::default();
     notes.extend(dataset.problems.iter().cloned());
@@ -185,12 +179,9 @@ fn predict(
     left_out: &mut Vec<Remark>,
     cx: &JobCx,
 ) -> Result<(), TaskError> {
-    let Generating { bundle, engine, config } = setup.recipe.generating()?;
-    let wanted: Vec<GenerateInput<'_>> = waiting
-        .iter()
-        .map(|touch| GenerateInput { difference: &touch.picture, seed: config.seed, size: [0, 0] })
-        .collect();
-    let made = models.predict(bundle, engine, config, &wanted, &cx.quiet())?;
+    let generating = setup.recipe.generating()?;
+    let wanted: Vec<_> = waiting.iter().map(|touch| generating.starting_from(&touch.picture)).collect();
+    let made = models.predict(generating, &wanted, &cx.quiet())?;
     for (touch, made) in waiting.into_iter().zip(made) {
         let chain = chain(&made, ShiftMode::ExactInverse)?.placed(touch.window);
         let size = made.raw.channels.first().map_or([0, 0], Grid::size);

@@ -16,7 +16,7 @@ use crate::learn::mask_worth::from_cad;
 use crate::steps::bundles::{BundleKind, by_id};
 use crate::steps::estimate::Touch;
 use crate::steps::imprint::imprint_of;
-use crate::steps::models::{GenerateInput, Models};
+use crate::steps::models::{Generating, Models};
 use crate::steps::tool::Tools;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::grid::{DepthMap, Mask};
@@ -234,9 +234,8 @@ fn imprint(
     let ends = generator.ends(&sample.rig).and_then(Result::ok);
     let picture = ends.and_then(|ends| touch.picture(ends.input));
     let picture = picture.ok_or_else(|| TaskError::new(WHAT, "the finger has no picture to predict from"))?;
-    let wanted = GenerateInput { difference: &picture, seed: config.seed, size: [0, 0] };
-    let quiet = JobCx::new(cx.cancel.clone(), std::sync::Arc::new(|_| {}));
-    let made = models.predict(generator, setup.engine, &config, &[wanted], &quiet)?.pop();
+    let generating = Generating { bundle: generator, engine: setup.engine, config: &config };
+    let made = generating.of(models, &[picture], &cx.quiet())?.pop();
     let made = made.ok_or_else(|| TaskError::new(WHAT, "the generator returned no prediction"))?;
     imprint_of(&made, shift, sample, place.pad)
 }

@@ -4,8 +4,7 @@ use std::sync::mpsc::sync_channel;
 
 use rayon::prelude::*;
 
-use super::{Setup, Skipped, ToolWork, by_tool};
-use crate::error::TaskError;
+use super::{Setup, Skipped, ToolWork};
 use crate::io::dataset::{Dataset, SourceKind};
 use crate::job::JobCx;
 use crate::labels::{Labels, PairLabels};
@@ -40,29 +39,16 @@ pub(super) struct Batch<'a> {
     pub(super) cases: Box<dyn Iterator<Item = Result<LoadedPairs, Vec<Skipped>>> + 'a>,
 }
 
-/// Labels that people gave the pairs, where they are to be taken.
-struct Labeled(Option<Labels>);
-
-impl Labeled {
-    fn of(dataset: &Dataset, setup: &Setup) -> Self {
-        Self(setup.recipe.hand.then(|| Labels::of(dataset)))
-    }
-
-    fn load(&self, name: &str) -> Result<Option<PairLabels>, TaskError> {
-        self.0.as_ref().map(|labels| labels.load(name)).transpose()
-    }
-}
-
 /// Grasps to be scored, tool by tool.
 pub(super) fn plan(dataset: &Dataset, setup: &Setup) -> Vec<ToolWork> {
-    by_tool(dataset)
+    pairs::by_tool(dataset)
         .into_iter()
         .map(|(tool, mut ids)| {
             if let Some(only) = &setup.pairs {
                 ids.retain(|id| only.contains(id));
             }
             let taken = pairs::spread(ids.len(), setup.grasps_per_tool);
-            ToolWork { tool, ids: taken.map(|at| ids[at]).collect() }
+            ToolWork { tool: tool.map(str::to_owned), ids: taken.map(|at| ids[at]).collect() }
         })
         .collect()
 }
@@ -71,7 +57,7 @@ pub(super) fn plan(dataset: &Dataset, setup: &Setup) -> Vec<ToolWork> {
 pub(super) fn ahead(dataset: &Dataset, setup: &Setup, work: &[ToolWork], cx: &JobCx, mut score: impl FnMut(Batch<'_>)) {
     // Both fingers of a grasp go through the generator together.
     let grasps = setup.batch.div_ceil(2).max(1);
-    let labels = &Labeled::of(dataset, setup);
+    let labels = &setup.recipe.hand.then(|| Labels::of(dataset));
     std::thread::scope(|scope| {
         let (sender, receiver) = sync_channel(1);
         scope.spawn(move || {
@@ -112,8 +98,8 @@ pub(super) fn ahead(dataset: &Dataset, setup: &Setup, work: &[ToolWork], cx: &Jo
     });
 }
 
-/// Reads one pair.
-fn load(dataset: &Dataset, labels: &Labeled, id: PairId) -> Result<LoadedPair, Skipped> {
+/// Reads one pair, with what people said of it where their labels are to be taken.
+fn load(dataset: &Dataset, labels: &Option<Labels>, id: PairId) -> Result<LoadedPair, Skipped> {
     let Some(entry) = dataset.index.get(id) else {
         return Err(Skipped { what: format!("pair {}", id.0), method: String::new(), why: "no such pair".into() });
     };
@@ -123,7 +109,8 @@ fn load(dataset: &Dataset, labels: &Labeled, id: PairId) -> Result<LoadedPair, S
     if sample.pads.iter().flatten().all(|t| t.color().is_none() || t.depth().is_none()) {
         return Err(skip("no finger has both a GelSlim image and a measured imprint".into()));
     }
-    let labels = labels.load(&entry.name).map_err(|err| skip(err.to_string()))?;
+    let labels = labels.as_ref().map(|labels| labels.load(&entry.name)).transpose();
+    let labels = labels.map_err(|err| skip(err.to_string()))?;
     let pictures = sample.scale == Scale::Assumed;
     let (tile, lab, clipped) = if pictures {
         let clipped = dataset.gelslim_is_clipped(id).map_err(fail)?;

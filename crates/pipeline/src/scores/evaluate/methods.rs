@@ -50,6 +50,7 @@ pub(super) struct GeneratorMethod {
 }
 
 /// Pictures that a method makes of one touch.
+#[derive(Default)]
 pub(super) struct Made {
     /// Imprints in meters, raw orientation, by finger.
     pub(super) imprints: PerPad<DepthMap>,
@@ -73,7 +74,7 @@ pub(super) struct Models {
     pub(super) classifier: Option<ToolClassifier>,
     engine: String,
     /// Number of masks that were not made of the source that was asked, by row and reason.
-    pub(super) made_otherwise: BTreeMap<(String, String), usize>,
+    pub(super) made_otherwise: BTreeMap<(String, &'static str), usize>,
 }
 
 fn open(origin: &Origin) -> Result<Bundle, TaskError> {
@@ -169,7 +170,7 @@ impl Models {
 
     /// Masks that were not made of the source that was asked, in words.
     pub(super) fn masks_made_otherwise(&self) -> Vec<String> {
-        let line = |((method, why), count): (&(String, String), &usize)| format!("{method}: {count} masks {why}");
+        let line = |((method, why), count): (&(String, &str), &usize)| format!("{method}: {count} masks {why}");
         self.made_otherwise.iter().map(line).collect()
     }
 
@@ -259,15 +260,14 @@ impl Method {
 }
 
 fn measured(case: &LoadedPair) -> Made {
-    let imprints = imprint::measured(&case.sample);
-    Made { imprints, colors: PerPad::default(), pictures: PerPad::default(), tile: None }
+    Made { imprints: imprint::measured(&case.sample), ..Made::default() }
 }
 
 fn stored(case: &LoadedPair) -> Result<Made, String> {
     let tile = case.lab.clone().ok_or("no stored prediction (NAME_vqvae.png) lies by this picture")?;
     let mut imprints = PerPad::default();
     imprints[PadId::new(0)] = Some(imprint_from_tile(&tile, &case.sample.rig));
-    Ok(Made { imprints, colors: PerPad::default(), pictures: PerPad::default(), tile: Some(tile) })
+    Ok(Made { imprints, tile: Some(tile), ..Made::default() })
 }
 
 impl GeneratorMethod {
@@ -278,17 +278,7 @@ impl GeneratorMethod {
             Ok(predictions) => predictions?,
             Err(err) => return Some(cases.iter().map(|_| Err(err.why.clone())).collect()),
         };
-        let mut made: Vec<Result<Made, String>> = cases
-            .iter()
-            .map(|_| {
-                Ok(Made {
-                    imprints: PerPad::default(),
-                    colors: PerPad::default(),
-                    pictures: PerPad::default(),
-                    tile: None,
-                })
-            })
-            .collect();
+        let mut made: Vec<Result<Made, String>> = cases.iter().map(|_| Ok(Made::default())).collect();
         let each = predictions.into_iter().enumerate().flat_map(|(at, pads)| {
             let pads = pads.into_iter().enumerate();
             pads.filter_map(move |(pad, made)| Some((at, PadId::new(pad), made?)))

@@ -56,12 +56,12 @@ pub(super) struct Entry {
     /// Oddities of the files.
     pub(super) notes: Vec<Problem>,
     /// Why masks are not of the source that was asked, with how many.
-    pub(super) otherwise: Vec<(String, usize)>,
+    pub(super) otherwise: BTreeMap<&'static str, usize>,
 }
 
 /// Why masks of a touch are not of the source that was asked, and how many.
-fn otherwise(estimate: &Estimate) -> Vec<(String, usize)> {
-    let mut otherwise: Vec<(String, usize)> = Vec::new();
+fn otherwise(estimate: &Estimate) -> BTreeMap<&'static str, usize> {
+    let mut otherwise = BTreeMap::new();
     let masked = estimate.has(Stage::Mask).then(|| estimate.contact());
     for ContactMask { basis, .. } in masked.iter().flat_map(|contact| contact.masks.iter().flatten()) {
         let why = match basis {
@@ -70,10 +70,7 @@ fn otherwise(estimate: &Estimate) -> Vec<(String, usize)> {
             MaskBasis::Flat => "are empty: the imprints are flat",
             MaskBasis::Depth(_) => "are by depth: the mask model found no contact in imprints that have some",
         };
-        match otherwise.iter_mut().find(|(known, _)| known == why) {
-            Some((_, count)) => *count += 1,
-            None => otherwise.push((why.to_owned(), 1)),
-        }
+        *otherwise.entry(why).or_insert(0) += 1;
     }
     otherwise
 }
@@ -101,7 +98,7 @@ struct Masked<'a> {
     /// Up to its masks, where they can be made.
     estimate: Option<Estimate>,
     /// Why some masks are not of the source that was asked.
-    otherwise: Vec<(String, usize)>,
+    otherwise: BTreeMap<&'static str, usize>,
     /// Intersection over union of each mask with the simulator's true contact.
     iou: PerPad<f64>,
 }
