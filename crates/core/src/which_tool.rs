@@ -1,6 +1,9 @@
 //! [`which_tool`]: the tool of a touch among several, by what each of them explains of contact and membranes.
 
+use std::sync::Arc;
+
 use crate::align::{AlignReport, Ask, Contacts, Prior, Register};
+use crate::mesh::TriMesh;
 use crate::pose::register_with;
 use crate::tool::ToolModel;
 use crate::verdict::{Grade, Verdict};
@@ -19,6 +22,8 @@ const SURE: f64 = 0.95;
 pub struct Candidate {
     /// Name of the tool.
     pub tool: String,
+    /// Its model, x from the middle between the sides that the fingers hold.
+    pub mesh: Arc<TriMesh>,
     /// Answer of the registration of its model, with the evidence.
     pub report: AlignReport,
     /// Logarithm of the misfit that it leaves of the membranes' relief, plus the share of contact that lies off it. Lower is
@@ -42,6 +47,7 @@ pub fn which_tool<'t>(
         let beyond = if Prior::default().allows(report.grasp_from_object) { 0.0 } else { BEYOND };
         Some(Candidate {
             tool: tool.to_owned(),
+            mesh: Arc::new(model.mesh.clone()),
             cost: misfit.ln() + 1.0 - evidence.on_tool + beyond,
             report,
             chance: 0.0,
@@ -71,6 +77,7 @@ pub fn in_words(ranked: &[Candidate]) -> String {
 mod tests {
     use super::*;
     use crate::align::JointConfig;
+    use crate::align::PadImage;
     use crate::catalog::tools;
     use crate::cloud::lift;
     use crate::rig::lab;
@@ -91,11 +98,8 @@ mod tests {
                     lift(&touch(pad).imprint, touch(pad).camera.as_ref().unwrap(), Some(contact)).unwrap().points,
                 );
             }
-            let images = lab::PADS.map(|pad| crate::align::PadImage {
-                imprint: &touch(pad).imprint,
-                camera: touch(pad).camera.as_ref().unwrap(),
-                predicted: false,
-            });
+            let images =
+                lab::PADS.map(|pad| PadImage::measured(&touch(pad).imprint, touch(pad).camera.as_ref().unwrap()));
             let contacts = Contacts { points: &points, images: &images };
             let all = which_tool(contacts, models.iter().map(|(name, m)| (name.as_str(), m)), &JointConfig::default());
             assert_eq!(

@@ -53,14 +53,18 @@ fn tools(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, pose: &PoseResult)
         Some(Lookup::Ready(all)) => {
             ui.label(RichText::new(format!("Tool: {}", in_words(all))).size(SMALL).color(cx.p.strong));
             let own = results::tool_name(cx.state).unwrap_or_default();
-            for candidate in all.iter().take(3) {
+            for (row, candidate) in all.iter().enumerate().take(3) {
                 let text = format!("{:3.0} %  {}", 100.0 * candidate.chance, candidate.tool);
                 let color = if candidate.tool == own { cx.p.text } else { cx.p.weak };
-                ui.label(RichText::new(text).size(SMALL).color(color)).on_hover_text(format!(
-                    "Probability that it is this tool, given that it is one of the {} of this data set; best angle {}",
+                let label = ui.label(RichText::new(text).size(SMALL).color(color)).on_hover_text(format!(
+                    "Probability that it is this tool, given that it is one of the {} of this data set; best angle {}. \
+                     The 3D view shows its outline there",
                     all.len(),
                     units::text_deg(candidate.report.lab_angle_rad())
                 ));
+                if label.hovered() || cx.shared.hovered_tool == Some((source, row)) {
+                    cx.shared.hovered_tool = label.hovered().then_some((source, row));
+                }
             }
         }
         Some(Lookup::Failed(err)) => {

@@ -126,6 +126,8 @@ pub(crate) struct Shared {
     pub views: Views,
     /// Pictures on the graphics card.
     pub textures: Textures,
+    /// Row of the tools tried for a side that the pointer is on: the 3D view has its outline.
+    pub hovered_tool: Option<(ImprintSource, usize)>,
     /// Dialogs.
     pub dialogs: Dialogs,
     /// Directions in which the 3D views look, by side.
@@ -146,6 +148,7 @@ impl Shared {
         Self {
             views: Views::default(),
             textures: Textures::default(),
+            hovered_tool: None,
             dialogs: Dialogs::new(native_dialogs),
             angles: [ViewAngles::default(); 2],
             readout: None,

@@ -169,6 +169,7 @@ pub(super) fn scene_of(cx: &Cx<'_>, memory: &Memory, source: ImprintSource) -> S
     let picked = picked.and_then(|picked| at(picked.finger, picked.pixel.map(usize::from)));
     scene.clouds.extend(picked.map(|point| one_point("picked", point, cx.p.accent, 11.0)));
     meshes(cx, memory, source, &mut scene);
+    scene.meshes.extend(hovered_tool(cx, source));
     steps::add(cx, memory, source, &mut scene);
     if shows(SceneLayer::Guides) {
         let (ground, ink) = (rgb(cx.p.canvas), rgb(cx.p.weak));
@@ -217,6 +218,21 @@ pub(super) fn models(cx: &Cx<'_>, source: ImprintSource) -> Vec<(SceneLayer, DAf
     let truth = results::sample(state).ready().and_then(|sample| sample.grasp_from_object);
     models.extend(truth.map(|pose| (SceneLayer::TrueCad, pose.to_affine())));
     models
+}
+
+/// The outline of the tool under the pointer among those that were tried.
+fn hovered_tool(cx: &Cx<'_>, source: ImprintSource) -> Option<MeshItem> {
+    let (_, row) = cx.shared.hovered_tool.filter(|(side, _)| *side == source)?;
+    let candidate = results::ranking(cx.state, source)?.ready()?.get(row)?;
+    let world_from_mesh = candidate.report.grasp_from_object.to_affine();
+    Some(MeshItem {
+        name: format!("CAD tried {}", candidate.tool),
+        revision: Arc::as_ptr(&candidate.mesh).addr() as u64,
+        mesh: candidate.mesh.clone(),
+        shading: Shading::Smooth,
+        values: Arc::default(),
+        style: items::outline(world_from_mesh, rgb(cx.p.accent), 1.0, 2.0),
+    })
 }
 
 /// The model, shaded where the tool is and as outlines where else it could be.
