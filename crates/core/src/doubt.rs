@@ -23,12 +23,11 @@ mod predictions;
 use std::collections::BTreeMap;
 
 use super::frames::PlanarPose;
-use super::mesh::TriMesh;
+use super::mesh::{Axes, TriMesh};
 use super::moments::median;
 use super::read_as::ReadAs;
 use super::sample::{PadTouch, Reading, Sample};
 
-pub use imprints::Axes;
 pub use poses::{Mismatch, Worth};
 pub use predictions::{Placed, likeness};
 
@@ -210,21 +209,24 @@ fn of_all_imprints(
         }
     }
     let (doubt, _) = by_imprints?;
+    let with_models = |others: BTreeMap<String, TriMesh>| {
+        let models = poses::models(pairs, &tools.clone().into_iter().chain(others).collect());
+        registered.is_cured_by(&poses::Registered::of(pairs, &models))
+    };
+    let turned = |(name, mesh): (&String, &TriMesh), axes: Axes| (name.clone(), axes.apply(mesh));
     // A cure is tried to the end before it is offered.
     let cured = match &doubt.cause {
+        Cause::Stored(ReadAs::CadAxes(axes)) => with_models(tools.iter().map(|tool| turned(tool, *axes)).collect()),
         Cause::Stored(read_as) => {
             let read: Vec<Sample> = pairs.iter().map(|pair| ReadAs::all(&[*read_as], pair.sample)).collect();
             registered.is_cured_by(&poses::Registered::of(&with_samples(pairs, &read), models))
         }
-        Cause::Axes(tools_of, axes) => {
-            let turned = tools_of.iter().filter_map(|name| Some((name.clone(), axes.apply(tools.get(name)?))));
-            let models = poses::models(pairs, &tools.clone().into_iter().chain(turned).collect());
-            registered.is_cured_by(&poses::Registered::of(pairs, &models))
+        Cause::Axes(names, axes) => {
+            with_models(names.iter().filter_map(|name| Some(turned(tools.get_key_value(name)?, *axes))).collect())
         }
         Cause::OtherTool(list) => {
             let other = list.iter().filter_map(|(name, other)| Some((name.clone(), tools.get(other)?.clone())));
-            let models = poses::models(pairs, &tools.clone().into_iter().chain(other).collect());
-            registered.is_cured_by(&poses::Registered::of(pairs, &models))
+            with_models(other.collect())
         }
         _ => true,
     };

@@ -1,10 +1,12 @@
 //! Triangle meshes: the CAD models of the tools, in meters and the object frame.
 
+mod axes;
 pub mod distance;
 pub mod sampling;
 
 use glam::DVec3;
 
+pub use axes::Axes;
 pub(crate) use distance::MeshDistance;
 
 /// An indexed triangle mesh.

@@ -8,6 +8,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use super::grid::RgbGrid;
+use super::mesh::Axes;
 use super::sample::{ColorImages, ColorTouch, DepthTouch, PadTouch, Sample};
 use super::turn::Turn;
 
@@ -171,6 +172,8 @@ pub enum ReadAs {
     Scale(Depths, f64),
     /// The depth cameras' focal lengths and centers times a factor.
     ScaleCamera(f64),
+    /// The CAD models with other axes.
+    CadAxes(Axes),
     /// The true angle with the other sign.
     NegateTheta,
     /// The fingers' color images in each other's place.
@@ -202,6 +205,7 @@ impl fmt::Display for ReadAs {
             Self::Lay(depths, lay) => write!(f, "{}{}", whole(depths), <&str>::from(lay)),
             Self::Scale(depths, factor) => write!(f, "{}scale-depth={factor}", whole(depths)),
             Self::ScaleCamera(factor) => write!(f, "scale-camera={factor}"),
+            Self::CadAxes(axes) => write!(f, "cad-axes={axes}"),
             Self::NegateTheta => f.write_str("negate-theta"),
             Self::ImageSwapFingers => f.write_str("image-swap-fingers"),
             Self::ImageLay(lay) => write!(f, "image-{}", <&str>::from(lay)),
@@ -218,7 +222,7 @@ impl fmt::Display for ReadAs {
 
 /// The keys, for people.
 pub(crate) const KEYS: &str = "swap-fingers, mirror-columns, mirror-rows, turn, scale-depth=FACTOR (each also as whole-..., which \
-                        includes the depth without contact), scale-camera=FACTOR, negate-theta, image-swap-fingers, \
+                        includes the depth without contact), scale-camera=FACTOR, cad-axes= (which axes of the files are x, y and z, as in x-zy), negate-theta, image-swap-fingers, \
                         image-mirror-columns, image-mirror-rows, image-turn, image-negative, image-swap-reference, image-unwrap, \
                         image-bgr=, image-255= (touch, reference or both), image-is-difference= (signed, gray or wrapped), image-colors= (gbr, brg, ycbcr, \
                         ycrcb, hsv or hsv-full)";
@@ -240,6 +244,7 @@ impl FromStr for ReadAs {
             ("swap-fingers", None) => Self::SwapFingers(depths),
             ("scale-depth", _) => Self::Scale(depths, factor()?),
             ("scale-camera", _) if bare == key => Self::ScaleCamera(factor()?),
+            ("cad-axes", Some(axes)) if bare == key => Self::CadAxes(axes.parse().map_err(|()| unknown())?),
             ("negate-theta", None) if bare == key => Self::NegateTheta,
             ("image-swap-fingers", None) if bare == key => Self::ImageSwapFingers,
             ("image-negative", None) if bare == key => Self::ImageNegative,
@@ -275,6 +280,7 @@ pub fn also(known: &[ReadAs], more: ReadAs) -> Vec<ReadAs> {
         more,
         ReadAs::Scale(..)
             | ReadAs::ScaleCamera(_)
+            | ReadAs::CadAxes(_)
             | ReadAs::Image255(_)
             | ReadAs::ImageColors(_)
             | ReadAs::ImageIsDifference(_)
@@ -315,6 +321,7 @@ impl ReadAs {
             Self::Scale(depths, factor) if factor < 0.0 => format!("{} have the other sign", imprints(depths)),
             Self::Scale(depths, factor) => format!("{} are {} times too large", imprints(depths), 1.0 / factor),
             Self::ScaleCamera(factor) => format!("the camera matrices are {} times too large", 1.0 / factor),
+            Self::CadAxes(axes) => format!("the CAD models have other axes ({axes} are x, y and z)"),
             Self::NegateTheta => "theta has the other sign".into(),
             Self::ImageSwapFingers => "the color images of the fingers are swapped".into(),
             Self::ImageLay(lay) => format!("the color images are {}", lay.text()),
@@ -335,7 +342,7 @@ impl ReadAs {
         }
     }
 
-    /// Reads a sample so. What it does not have stays absent.
+    /// Reads a sample so. What it does not have stays absent; CAD models are none of it.
     pub fn apply(self, sample: &mut Sample) {
         match self {
             Self::SwapFingers(depths) => swap_depths(sample, depths),
@@ -359,6 +366,7 @@ impl ReadAs {
                     }
                 }
             }),
+            Self::CadAxes(_) => {}
             Self::NegateTheta => {
                 // The lab stores the angle and place of the inverse: its place stays.
                 sample.grasp_from_object = sample.grasp_from_object.map(|pose| {
@@ -534,13 +542,16 @@ mod tests {
     #[test]
     fn what_is_written_is_read_and_nothing_else_is() {
         for read_as in all() {
-            assert_eq!(read_as.to_string().parse(), Ok(read_as));
             assert!(
                 KEYS.contains(read_as.to_string().trim_start_matches("whole-").split('=').next().unwrap()),
                 "{read_as}"
             );
             assert!(!read_as.mistake().is_empty());
         }
+        all()
+            .into_iter()
+            .chain(Axes::others().map(ReadAs::CadAxes))
+            .for_each(|each| assert_eq!(each.to_string().parse(), Ok(each)));
         assert_eq!(parse_list(&list(&all())), Ok(all()));
         assert_eq!(parse_list(" \n"), Ok(Vec::new()));
         for wrong in [
@@ -551,6 +562,7 @@ mod tests {
             "scale-depth=NaN",
             "scale-camera=1e9",
             "turn=1",
+            "cad-axes=xyy",
             "image-",
         ] {
             assert!(wrong.parse::<ReadAs>().is_err(), "{wrong}");

@@ -256,19 +256,19 @@ fn models() -> Vec<Kind> {
             *first = other.clone();
         }
     }));
-    let axes: [(&str, TurnModel); 9] = [
-        ("mirrored along y", |p| DVec3::new(p.x, -p.y, p.z)),
-        ("mirrored along z", |p| DVec3::new(p.x, p.y, -p.z)),
-        ("turned by 180 degrees about x", |p| DVec3::new(p.x, -p.y, -p.z)),
-        ("turned by 90 degrees about x", |p| DVec3::new(p.x, -p.z, p.y)),
-        ("y and z exchanged", |p| DVec3::new(p.x, p.z, p.y)),
-        ("x and y exchanged", |p| DVec3::new(p.y, p.x, p.z)),
-        ("x and z exchanged", |p| DVec3::new(p.z, p.y, p.x)),
-        ("z, x, y", |p| DVec3::new(p.z, p.x, p.y)),
-        ("y, z, x", |p| DVec3::new(p.y, p.z, p.x)),
+    let axes: [(&str, &str, TurnModel); 9] = [
+        ("mirrored along y", "-x-yz", |p| DVec3::new(p.x, -p.y, p.z)),
+        ("mirrored along z", "-xy-z", |p| DVec3::new(p.x, p.y, -p.z)),
+        ("turned by 180 degrees about x", "x-y-z", |p| DVec3::new(p.x, -p.y, -p.z)),
+        ("turned by 90 degrees about x", "xz-y", |p| DVec3::new(p.x, -p.z, p.y)),
+        ("y and z exchanged", "-xzy", |p| DVec3::new(p.x, p.z, p.y)),
+        ("x and y exchanged", "-yxz", |p| DVec3::new(p.y, p.x, p.z)),
+        ("x and z exchanged", "-zyx", |p| DVec3::new(p.z, p.y, p.x)),
+        ("z, x, y", "yzx", |p| DVec3::new(p.z, p.x, p.y)),
+        ("y, z, x", "zxy", |p| DVec3::new(p.y, p.z, p.x)),
     ];
-    for (name, turn) in axes {
-        all.push(kind(&format!("CAD models: {name}"), &["tool-axes"], move |set| {
+    for (name, axes, turn) in axes {
+        all.push(kind(&format!("CAD models: {name}"), &[&format!("cad-axes={axes}")], move |set| {
             for vertex in set.tools.values_mut().flat_map(|mesh| &mut mesh.vertices) {
                 *vertex = turn(*vertex);
             }

@@ -1,14 +1,11 @@
 //! Imprints against CAD models, under every reading of both.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fmt;
-
-use glam::DVec3;
 
 use super::fit::{angle_error_rad, grainless, likeness, registered};
 use super::{Cause, Doubt, Gain, PairInput, SAME, median};
 use crate::field::DistanceField;
-use crate::mesh::TriMesh;
+use crate::mesh::{Axes, TriMesh};
 use crate::read_as::{Depths, Lay, ReadAs};
 use crate::sample::{PadTouch, Sample};
 use crate::units::counted;
@@ -45,45 +42,6 @@ fn readings() -> Vec<ReadAs> {
     all.push(ReadAs::Scale(Depths::Imprints, -1.0));
     all.extend([0.5, 0.8, 1.25, 2.0].map(ReadAs::ScaleCamera));
     all
-}
-
-/// Reordering of the axes of a CAD model: which of them, with which sign, becomes x, y and z.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Axes {
-    from: [usize; 3],
-    negative: [bool; 3],
-}
-
-impl Axes {
-    /// All that change the outline, which is seen along x: the sign of x does not count.
-    fn all() -> Vec<Self> {
-        let orders = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
-        let signs = [[false, false], [true, false], [false, true], [true, true]];
-        let all = orders.iter().flat_map(|&from| signs.map(|[y, z]| Self { from, negative: [false, y, z] }));
-        all.skip(1).collect()
-    }
-
-    /// The model turned so.
-    pub fn apply(self, mesh: &TriMesh) -> TriMesh {
-        let turned = |p: &DVec3| {
-            let p = p.to_array();
-            let sign = |i: usize| if self.negative[i] { -1.0 } else { 1.0 };
-            DVec3::from_array(std::array::from_fn(|i| sign(i) * p[self.from[i]]))
-        };
-        TriMesh { vertices: mesh.vertices.iter().map(turned).collect(), triangles: mesh.triangles.clone() }
-    }
-}
-
-impl fmt::Display for Axes {
-    /// `x = x, y = -z, z = y`.
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for i in 0..3 {
-            let sign = if self.negative[i] { "-" } else { "" };
-            let comma = if i == 0 { "" } else { ", " };
-            write!(f, "{comma}{} = {sign}{}", ["x", "y", "z"][i], ["x", "y", "z"][self.from[i]])?;
-        }
-        Ok(())
-    }
 }
 
 /// Pairs with a CAD model, their imprints without grain.
@@ -305,9 +263,17 @@ fn of_models(
     }
     if let Some((axes, tools)) = turned.filter(|_| by_axes > by_others) {
         let names: Vec<String> = tools.iter().map(|(tool, _)| (*tool).to_owned()).collect();
+        let figures = format!("the imprints then lie on them with a similarity of {by_axes:.2} instead of {mean:.2}");
+        // One program drew them all, unless a tool is only right as it is.
+        let of_all = pairs.tools.iter().filter(|tool| names.iter().all(|name| name != *tool)).all(|tool| {
+            let turned = meshes.get(*tool).and_then(|mesh| DistanceField::from_mesh(&axes.apply(mesh)).ok());
+            turned.is_some_and(|field| pairs.of_tool(tool, &field) > pairs.of_tool(tool, &pairs.fields[tool]) - SAME)
+        });
+        if of_all {
+            return Some((Doubt::stored(ReadAs::CadAxes(axes), &figures), by_axes));
+        }
         let what = format!(
-            "the CAD models of {} have other axes ({}): with {axes} of the file the imprints lie on them with a likeness of \
-             {by_axes:.2} instead of {mean:.2}",
+            "the CAD models of {} have other axes ({}), {axes} as x, y and z: {figures}",
             counted(names.len(), "tool"),
             names.join(", ")
         );
@@ -383,7 +349,7 @@ fn other_axes<'a>(
 ) -> Option<(Axes, Vec<(&'a str, f64)>)> {
     let mut best: Option<(Axes, Vec<(&str, f64)>)> = None;
     let total = |tools: &[(&str, f64)]| tools.iter().map(|(_, gain)| gain).sum::<f64>();
-    for axes in Axes::all() {
+    for axes in Axes::others() {
         let mut tools = Vec::new();
         for &(tool, as_is) in doubted {
             let Some(field) = meshes.get(tool).and_then(|mesh| DistanceField::from_mesh(&axes.apply(mesh)).ok()) else {

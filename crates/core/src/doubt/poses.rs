@@ -378,7 +378,9 @@ fn graded_pose(sample: &Sample, tool: &ToolModel) -> Option<(Grade, PlanarPose)>
     let points = contact_points(sample)?;
     let depths = sample.pads.iter().flatten().filter_map(|touch| touch.depth().zip(touch.camera()));
     let depths = depths.filter(|(depth, _)| rest_and_top(&depth.imprint).is_some());
-    let images = depths.map(|(depth, camera)| PadImage { imprint: &depth.imprint, camera, predicted: false });
+    let tolerance = sample.rig.camera_tolerance;
+    let images =
+        depths.map(|(depth, camera)| PadImage { imprint: &depth.imprint, camera, predicted: false, tolerance });
     let images: Vec<_> = images.collect();
     let contacts = Contacts { points: &points, images: &images };
     let ask = Ask { evidence: true, ..Ask::default() };

@@ -122,7 +122,7 @@ fn a_wrong_cad_model_is_named() {
     assert_eq!(exchanged.judged(), ["other-tool"]);
     let mut mirrored = Set { pairs: sound.pairs, tools: sound.tools };
     mirrored.tools.values_mut().flat_map(|mesh| &mut mesh.vertices).for_each(|vertex| vertex.y = -vertex.y);
-    assert_eq!(mirrored.judged(), ["tool-axes"]);
+    assert_eq!(mirrored.judged(), ["cad-axes=-x-yz"]);
 }
 
 #[test]

@@ -6,6 +6,7 @@ use super::{Dataset, problem};
 use crate::io::error::FileError;
 use crate::io::{atomic, files};
 use touch2touch_core::dataset::Problem;
+use touch2touch_core::mesh::Axes;
 use touch2touch_core::read_as::{ReadAs, list, parse_list};
 use touch2touch_core::sample::Sample;
 use touch2touch_core::turn::Turn;
@@ -79,6 +80,14 @@ impl Dataset {
     /// Reads a loaded sample so.
     pub(super) fn read_otherwise(&self, sample: &mut Sample) {
         self.read_as.iter().for_each(|read_as| read_as.apply(sample));
+    }
+
+    /// Axes of the CAD models' files that are x, y and z, one after the other.
+    pub(super) fn cad_axes(&self) -> impl Iterator<Item = Axes> + '_ {
+        self.read_as.iter().filter_map(|read_as| match read_as {
+            ReadAs::CadAxes(axes) => Some(*axes),
+            _ => None,
+        })
     }
 
     /// Turns by which the pictures of imprints are laid down anew.
