@@ -147,7 +147,7 @@ fn pose_cases(
         let model = likeliest.and_then(|name| tried.iter().find(|(tool, _)| *tool == name)).map(|(_, model)| *model);
         let tool = model.map_or(touch.tool, Ok).map_err(Clone::clone);
         let starts = (!args.starts.is_empty()).then_some(args.starts.as_slice());
-        let ask = Ask { starts, record: args.trace, evidence: true };
+        let ask = Ask { starts, record: args.trace, evidence: true, ..Ask::default() };
         let found = tool.and_then(|tool| estimate.pose_by(sample, tool, &*by.method(), ask));
         let answer = found.as_ref().ok();
         let place = answer.map(PoseResult::object_from_grasp);

@@ -15,7 +15,7 @@ use super::{case, lifted, suite};
 /// The pose of contact points by the joint registration, with the case's cameras and other imprints than its own.
 fn registered(points: &[DVec3], imprints: &[DepthMap; 2], predicted: bool) -> AlignReport {
     let (case, model) = case();
-    let image = |f: usize| PadImage { imprint: &imprints[f], camera: &case.cameras[f], predicted };
+    let image = |f: usize| PadImage { predicted, ..PadImage::measured(&imprints[f], &case.cameras[f]) };
     register(Contacts { points, images: &[image(0), image(1)] }, model, Registration::default(), false).unwrap()
 }
 

@@ -19,13 +19,14 @@ use crate::json::JsonArgs;
 use touch2touch::headless::{Output, VerbResult};
 use touch2touch_bench::known::{Case, Stratum, spoilt};
 use touch2touch_bench::random_tool::random_tool;
-use touch2touch_core::align::{Ask, Contacts, Evidence, Range};
+use touch2touch_core::align::{Ask, Contacts, Evidence, PadImage, Range};
 use touch2touch_core::catalog::{self, ToolSpec};
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::pose::{Registration, ToolModel, register, register_with};
+use touch2touch_core::rig::CameraTolerance;
 use touch2touch_core::sim::{BubbleConfig, Grasp, SimConfig, random_grasp, random_grasp_within, simulate};
 use touch2touch_core::symmetry::Symmetry;
-use touch2touch_core::verdict::{Grade, Verdict};
+use touch2touch_core::verdict::{Grade, SignKind, Verdict};
 
 /// A pose this far off is right, degrees; and millimeters, for an answer beside the first.
 const RIGHT_DEG: f64 = 5.0;
@@ -38,6 +39,9 @@ const ANY_PLACE_M: f64 = 0.015;
 const DRAWN: usize = 24;
 /// Calls of which the shortest is the time: other programs only add to it.
 const CALLS: usize = 5;
+/// Errors of an angle that are compared with its deviation, degrees, and deviations that one of them counts at most.
+const NEAR_DEG: f64 = 10.0;
+const MOST_SD: f64 = 5.0;
 /// Bins of the weights.
 const BINS: usize = 10;
 
@@ -50,8 +54,20 @@ pub(super) struct GraspsArgs {
     /// Seed of tools, grasps, noise and masks.
     #[arg(long, default_value_t = 1)]
     simulation_seed: u64,
+    /// Standard deviations of the cameras' poses, degrees and millimeters, which the rig then says: `3,1`.
+    #[arg(long, value_delimiter = ',')]
+    cameras: Option<Vec<f64>>,
     #[command(flatten)]
     json: JsonArgs,
+}
+
+impl GraspsArgs {
+    fn tolerance(&self) -> CameraTolerance {
+        let [angle_deg, place_mm] = self.cameras.as_deref().unwrap_or_default() else {
+            return CameraTolerance::default();
+        };
+        CameraTolerance { angle_deg: *angle_deg, place_mm: *place_mm }
+    }
 }
 
 /// Set of grasps.
@@ -81,6 +97,7 @@ struct Held {
     hangs: bool,
     /// Position of a tool that it is not of.
     other: usize,
+    tolerance: CameraTolerance,
 }
 
 /// Soap film that reaches the middle plane of a tool.
@@ -97,7 +114,7 @@ fn film(half_thickness_m: f64) -> BubbleConfig {
     }
 }
 
-fn held(tools: &[ToolSpec], reach: Reach, seed: u64, position: usize) -> Held {
+fn held(tools: &[ToolSpec], reach: Reach, seed: u64, position: usize, tolerance: CameraTolerance) -> Held {
     let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_mul(1_000_003).wrapping_add(position as u64));
     rng.set_stream(reach as u64 + 1);
     let lab = catalog::tools().len();
@@ -109,8 +126,8 @@ fn held(tools: &[ToolSpec], reach: Reach, seed: u64, position: usize) -> Held {
     if !hangs {
         config.bubble = film(tools[tool].half_thickness_m);
     }
-    config.bubble.calibration_rad = 0.25_f64.to_radians();
-    config.bubble.calibration_m = 0.2e-3;
+    config.bubble.calibration_rad = tolerance.angle_deg.to_radians();
+    config.bubble.calibration_m = tolerance.place_mm * 1e-3;
     config.bubble.dropped_share = 0.0;
     if stratum == Stratum::Hard {
         config.bubble.noise_m *= 1.5;
@@ -119,7 +136,7 @@ fn held(tools: &[ToolSpec], reach: Reach, seed: u64, position: usize) -> Held {
     let sample = simulate(&tools[tool], reach.grasp(rng.random()), rng.random(), &config);
     let case = spoilt(&sample, tool, stratum, &mut rng);
     let other = (tool + rng.random_range(1..tools.len())) % tools.len();
-    Held { case, hangs, other }
+    Held { case, hangs, other, tolerance }
 }
 
 /// An answer beside the truth.
@@ -179,7 +196,7 @@ fn errors(pose: PlanarPose, truth: PlanarPose, symmetry: &Symmetry) -> (f64, f64
 fn found(held: &Held, range: Range, tools: &Tools) -> Found {
     let engine = Registration::Joint(range);
     let case = &held.case;
-    let images = images(case);
+    let images = images(case).map(|image| PadImage { tolerance: held.tolerance, ..image });
     let points = points(case, &case.masks).unwrap_or_default();
     let contacts = Contacts { points: &points, images: &images };
     let method = engine.method();
@@ -234,6 +251,8 @@ struct Line {
     calibration: f64,
     /// Grasps of tools that no turn takes to themselves, of which an answer beside the right one is told.
     second: f64,
+    /// Root mean square of the angle's error over its deviation, where that is below 10 degrees and the membranes had a say.
+    deviations: f64,
     /// Right poses that are doubted, and called wrong.
     right_doubted: f64,
     right_wrong: f64,
@@ -260,6 +279,11 @@ impl Line {
             *bin = (bin.0 + 1, bin.1 + answer.weight, bin.2 + usize::from(answer.right));
             listed += 1;
         }
+        let told = all.iter().filter_map(|(_, found)| Some((found.error_deg?, found.verdict.as_ref()?)));
+        let by_membrane = |verdict: &Verdict| verdict.against.iter().all(|sign| sign.kind != SignKind::MaskAlone);
+        let near = told.filter(|(deg, verdict)| *deg < NEAR_DEG && by_membrane(verdict));
+        let squares: Vec<f64> =
+            near.map(|(deg, verdict)| (deg.to_radians() / verdict.angle.sd).min(MOST_SD).powi(2)).collect();
         let apart = bins.iter().map(|(_, weight, right)| (weight - *right as f64).abs()).sum::<f64>();
         Self {
             grasps: all.len(),
@@ -274,6 +298,7 @@ impl Line {
             second: share(&|row, _| row.turns == 0, &|found| {
                 found.answers.iter().any(|answer| answer.right) && found.answers.iter().any(|answer| !answer.right)
             }),
+            deviations: (squares.iter().sum::<f64>() / (squares.len() as f64).max(1.0)).sqrt(),
             right_doubted: share(&|_, found| right(found), &|found| graded(&found.verdict, Grade::Check)),
             right_wrong: share(&|_, found| right(found), &|found| graded(&found.verdict, Grade::Wrong)),
             other_told: share(&any, &|found| graded(&found.wrong_tool, Grade::Check)),
@@ -284,7 +309,7 @@ impl Line {
     fn text(&self, name: &str) -> String {
         let number = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.2}"));
         format!(
-            "{name:34} {:>5} {:>6.1} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6.1} {:>6.3} {:>6.1} {:>6.1} {:>6.1} {:>6.1} {:>6.1}\n",
+            "{name:34} {:>5} {:>6.1} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6.1} {:>6.3} {:>6.1} {:>6.2} {:>6.1} {:>6.1} {:>6.1} {:>6.1}\n",
             self.grasps,
             self.within_5,
             number(self.mean_deg),
@@ -295,6 +320,7 @@ impl Line {
             self.listed,
             self.calibration,
             self.second,
+            self.deviations,
             self.right_doubted,
             self.right_wrong,
             self.other_told,
@@ -334,7 +360,7 @@ fn lines(rows: &[Row]) -> Vec<(String, Line)> {
 }
 
 fn text(report: &Report) -> String {
-    let head = "grasps: range                          n   <=5°   mean median    p95     ms p95 ms listed  calib second doubted  wrong  other  wrong";
+    let head = "grasps: range                          n   <=5°   mean median    p95     ms p95 ms listed  calib second    rms doubted  wrong  other  wrong";
     let lines: String = report.lines.iter().map(|(name, line)| line.text(name)).collect();
     format!("{}\n\n{head}\n{lines}", report.machine.text())
 }
@@ -351,7 +377,7 @@ pub(super) fn run(args: &GraspsArgs) -> VerbResult {
     let mut rows = Vec::new();
     for reach in [Reach::Any, Reach::Lab] {
         for position in 0..args.grasps as usize {
-            let held = held(&tools.specs, reach, seed, position);
+            let held = held(&tools.specs, reach, seed, position, args.tolerance());
             let tool = held.case.tool;
             output.step(&tools.specs[tool].name);
             let truth = held.case.grasp_from_object;

@@ -309,9 +309,8 @@ pub(super) fn points(case: &Case, masks: &[Mask; 2]) -> Result<Vec<DVec3>, Cloud
 /// Views of the cameras of both fingers.
 pub(super) fn images(case: &Case) -> [PadImage<'_>; 2] {
     std::array::from_fn(|f| PadImage {
-        imprint: &case.imprints[f],
-        camera: &case.cameras[f],
         predicted: case.predicted,
+        ..PadImage::measured(&case.imprints[f], &case.cameras[f])
     })
 }
 

@@ -32,6 +32,26 @@ pub struct Rig {
     /// Windows: where one sensor's view lies in another's.
     #[serde(default)]
     pub windows: Vec<Window>,
+    /// How well the places of the depth cameras are known.
+    #[serde(default)]
+    pub camera_tolerance: CameraTolerance,
+}
+
+/// Standard deviations of a camera's true pose in the gripper from the one that the data give.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CameraTolerance {
+    /// Of the angle about the closing axis, degrees.
+    pub angle_deg: f64,
+    /// Of the place along each axis, millimeters.
+    pub place_mm: f64,
+}
+
+impl Default for CameraTolerance {
+    /// A good mount's.
+    fn default() -> Self {
+        Self { angle_deg: 0.25, place_mm: 0.2 }
+    }
 }
 
 /// The position of a sensor in [`Rig::sensors`].

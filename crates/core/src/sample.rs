@@ -23,6 +23,8 @@ pub struct Sample {
     pub pads: PerPad<PadTouch>,
     /// The true in-hand pose, where known. Its inverse carries the lab's angle sign.
     pub grasp_from_object: Option<PlanarPose>,
+    /// True where the poses that its data set gives all lie in the lab's grid: then its own probably does.
+    pub in_lab_grid: bool,
     /// Scale: whether lengths are measured, or assumed because the source lost its scale.
     pub scale: Scale,
     /// Turn of the source's images before they were laid upright; upright for whatever comes from a sensor.
@@ -44,6 +46,7 @@ impl Default for Sample {
             rig: Rig::lab(),
             pads: PerPad::default(),
             grasp_from_object: None,
+            in_lab_grid: false,
             scale: Scale::default(),
             laid: Turn::default(),
             reading: None,

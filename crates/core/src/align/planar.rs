@@ -24,6 +24,7 @@ use super::{
 use crate::field::DistanceField;
 use crate::frames::PlanarPose;
 use crate::mesh::sampling::spread;
+use crate::rig::CameraTolerance;
 
 /// Points of the answer; more are thinned evenly.
 const POINTS: usize = 2048;
@@ -359,7 +360,7 @@ impl<'a> Problem<'a> {
         let (config, c) = (self.config, self.centroid);
         let best = *answer.best();
         let runs = &answer.runs;
-        let told = || Uncertainty::of_mask(points_yz, self.field, answer.pose);
+        let told = || Uncertainty::of_mask(points_yz, self.field, answer.pose, CameraTolerance::default());
         let pose = config.prior.slid_in(answer.pose, told);
         let run = |(run, start): (&Progress, &PlanarPose)| {
             let last = run.merged_into.map_or(run, |other| &runs[other]);

@@ -6,6 +6,7 @@ use super::{AlignConfig, AlignError, AlignReport, MIN_SHARE, REACH_M, align};
 use crate::field::DistanceField;
 use crate::frames::PlanarPose;
 use crate::grid::DepthMap;
+use crate::rig::CameraTolerance;
 use crate::sample::DepthCamera;
 use crate::tool::ToolModel;
 
@@ -18,6 +19,15 @@ pub struct PadImage<'a> {
     pub camera: &'a DepthCamera,
     /// True where a model predicted it. Such an image has no pixel noise: its errors are of shape, wider than the finest band.
     pub predicted: bool,
+    /// How well the camera's place is known.
+    pub tolerance: CameraTolerance,
+}
+
+impl<'a> PadImage<'a> {
+    /// What a camera in a good mount measured.
+    pub fn measured(imprint: &'a DepthMap, camera: &'a DepthCamera) -> Self {
+        Self { imprint, camera, predicted: false, tolerance: CameraTolerance::default() }
+    }
 }
 
 /// Contact points of a grasp, and the images of the membranes that they are from.
@@ -66,6 +76,11 @@ impl<'a> Scene<'a> {
         self.contacts.points
     }
 
+    /// How well the places of its cameras are known.
+    pub(super) fn tolerance(&self) -> CameraTolerance {
+        self.images().first().map(|image| image.tolerance).unwrap_or_default()
+    }
+
     /// The images of the pads.
     pub fn images(&self) -> &'a [PadImage<'a>] {
         self.contacts.images
@@ -84,6 +99,8 @@ pub struct Ask<'a> {
     pub starts: Option<&'a [PlanarPose]>,
     /// Keep per-iteration states and per-point residuals.
     pub record: bool,
+    /// The pose probably lies in the lab's grid: one outside must be ahead by more. It decides no verdict.
+    pub in_lab_grid: bool,
     /// Gather the evidence for and against the answer.
     pub evidence: bool,
 }

@@ -8,6 +8,7 @@ use super::observability::{Observability, observability};
 use super::{ANGLE_SCALE_M, Prior};
 use crate::field::DistanceField;
 use crate::frames::PlanarPose;
+use crate::rig::CameraTolerance;
 
 /// Standard deviation of a place, where it is known least, beyond which the contact leaves it open, meters. The gripper alone knows
 /// it to 2.9 mm.
@@ -26,9 +27,6 @@ pub struct Uncertainty {
     pub center: DVec2,
 }
 
-/// Deviation of a camera's true angle about the closing axis from the nominal one, radians, and of its place per axis, meters:
-/// a good mount's. Each finger has its own.
-const MOUNTING: [f64; 2] = [0.25 / 180.0 * std::f64::consts::PI, 0.2e-3];
 /// Deviation of the place, y and z, that no finger can see alone: where the template is not the membrane's own law, or the
 /// camera, which looks obliquely along z, does not see behind the tool. From fresh grasps under two laws.
 const LAW_M: [f64; 2] = [0.2e-3, 0.28e-3];
@@ -37,15 +35,20 @@ const OUTLINE_M: f64 = 0.07e-3;
 
 impl Uncertainty {
     /// From the information (inverse covariance) about (angle times [`ANGLE_SCALE_M`], y, z) of the tool turned about
-    /// `center`, grasp frame, of so many cameras.
-    pub(super) fn new(information: Matrix3<f64>, center: DVec2, pose: PlanarPose, cameras: f64) -> Self {
+    /// `center`, grasp frame, of so many cameras, each with a mount of its own.
+    pub(super) fn new(
+        information: Matrix3<f64>,
+        center: DVec2,
+        pose: PlanarPose,
+        (mount, cameras): (CameraTolerance, f64),
+    ) -> Self {
         let Prior { theta_rad, shift_m } = Prior::default();
         // Of an even distribution.
         let held = [theta_rad * ANGLE_SCALE_M, shift_m, shift_m].map(|half| half * half / 3.0);
         let held_only = Matrix3::from_diagonal(&held.into());
         let told = (information + Matrix3::from_diagonal(&held.map(|v| 1.0 / v).into())).try_inverse();
-        let place = LAW_M.map(|law| MOUNTING[1].powi(2) / cameras + law.powi(2));
-        let mounting = [(MOUNTING[0] * ANGLE_SCALE_M).powi(2) / cameras, place[0], place[1]];
+        let place = LAW_M.map(|law| (mount.place_mm * 1e-3).powi(2) / cameras + law.powi(2));
+        let mounting = [(mount.angle_deg.to_radians() * ANGLE_SCALE_M).powi(2) / cameras, place[0], place[1]];
         let at_center = told.unwrap_or(held_only) + Matrix3::from_diagonal(&mounting.into());
         // The place of the object's origin moves with the angle.
         let arm = (DVec2::new(pose.y_m, pose.z_m) - center).perp() / ANGLE_SCALE_M;
@@ -54,13 +57,18 @@ impl Uncertainty {
     }
 
     /// Uncertainty of a pose from the mask alone. `points_yz` in the grasp frame, meters.
-    pub(super) fn of_mask(points_yz: &[DVec2], field: &DistanceField, pose: PlanarPose) -> Self {
+    pub(super) fn of_mask(
+        points_yz: &[DVec2],
+        field: &DistanceField,
+        pose: PlanarPose,
+        mount: CameraTolerance,
+    ) -> Self {
         let Observability { eigenvalues, motions, center, .. } = observability(points_yz, field, pose);
         let information = eigenvalues.iter().zip(motions).map(|(value, motion)| {
             let motion = Vector3::from(motion);
             motion * motion.transpose() * (value / (OUTLINE_M * OUTLINE_M))
         });
-        Self::new(information.sum(), center, pose, 2.0)
+        Self::new(information.sum(), center, pose, (mount, 2.0))
     }
 
     /// The same pose if another estimate says that it lies elsewhere: their difference is a part of the spread, at most so many

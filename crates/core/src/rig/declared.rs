@@ -1,7 +1,9 @@
 //! A rig as a file declares it: read, and refused where its numbers cannot be those of a gripper, because every length and
 //! every file name of the data set follows from them.
 
-use super::{Crop, Rig, Sensor, Text, Window};
+use serde::Deserialize;
+
+use super::{CameraTolerance, Crop, Rig, Sensor, Text, Window, lab};
 use crate::text::is_unprintable;
 
 /// Sensors and pads at most.
@@ -16,18 +18,31 @@ const LARGEST_SIDE: usize = 4096;
 const LARGEST_FULL: usize = 65_536;
 /// Pixels per meter that a tactile sensor can have: 10 mm to 1 um for a pixel.
 const PX_PER_M: std::ops::RangeInclusive<f64> = 100.0..=1e6;
+/// Standard deviations of a camera's mount, degrees and millimeters, at most.
+const TOLERANCE_DEG: f64 = 20.0;
+const TOLERANCE_MM: f64 = 20.0;
 /// A window is at most this many times as wide or high as the picture that it lies in.
 const LARGEST_WINDOW: f64 = 10.0;
 /// Words that end the names of other pictures of a touch, or stand for all fingers.
 const TAKEN: [&str; 4] = ["touch", "reference", "vqvae", "both"];
 
+/// The lab's rig with other cameras' mounts.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct OfTheLab {
+    camera_tolerance: CameraTolerance,
+}
+
 impl Rig {
-    /// A rig declared in JSON.
+    /// A rig declared in JSON: the whole of it, or only how well the cameras of the lab's are mounted.
     ///
     /// # Errors
     /// Fault of the declaration, in words.
     pub fn parse(json: &[u8]) -> Result<Self, String> {
-        let rig: Self = serde_json::from_slice(json).map_err(|err| err.to_string())?;
+        let rig = match serde_json::from_slice(json) {
+            Ok(OfTheLab { camera_tolerance }) => Self { camera_tolerance, ..lab::rig() },
+            Err(_) => serde_json::from_slice(json).map_err(|err| err.to_string())?,
+        };
         rig.check()?;
         Ok(rig)
     }
@@ -50,6 +65,12 @@ impl Rig {
         names.chain([&self.name]).try_for_each(|name| check_name(name))?;
         for sensor in &self.sensors {
             sensor.check().map_err(|why| format!("sensor {}: {why}", sensor.key))?;
+        }
+        let CameraTolerance { angle_deg, place_mm } = self.camera_tolerance;
+        if !((0.0..=TOLERANCE_DEG).contains(&angle_deg) && (0.0..=TOLERANCE_MM).contains(&place_mm)) {
+            return Err(format!(
+                "camera_tolerance: angle_deg must be 0 to {TOLERANCE_DEG} and place_mm 0 to {TOLERANCE_MM}"
+            ));
         }
         for (index, window) in self.windows.iter().enumerate() {
             self.check_window(window).map_err(|why| format!("window {index}, counted from 0: {why}"))?;

@@ -5,7 +5,7 @@
 
 use std::borrow::Cow;
 
-use super::{Crop, Pad, PadId, Rig, Sensor, SensorId, SensorKind, Window};
+use super::{CameraTolerance, Crop, Pad, PadId, Rig, Sensor, SensorId, SensorKind, Window};
 
 /// The right finger: index 0 in the lab's files.
 pub const RIGHT: PadId = PadId::new(0);
@@ -76,6 +76,7 @@ pub(super) fn rig() -> Rig {
         sensors: vec![GELSLIM.clone(), BUBBLE.clone()],
         pads: pads(),
         windows: vec![window(RIGHT, WINDOW_CENTERS_PX[0]), window(LEFT, WINDOW_CENTERS_PX[1])],
+        camera_tolerance: CameraTolerance::default(),
     }
 }
 
@@ -89,6 +90,7 @@ pub fn depth_rig() -> Rig {
         sensors: vec![GELSLIM.clone(), GELSLIM_DEPTH.clone()],
         pads: pads(),
         windows: PADS.map(window).to_vec(),
+        camera_tolerance: CameraTolerance::default(),
     }
 }
 

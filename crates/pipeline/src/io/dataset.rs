@@ -25,9 +25,11 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
+use touch2touch_core::align::Prior;
 use touch2touch_core::dataset::{Index, PairEntry, PairId, Problem};
 use touch2touch_core::grid::Grid;
 use touch2touch_core::mesh::TriMesh;
+use touch2touch_core::mesh::sampling::spread;
 use touch2touch_core::read_as::ReadAs;
 use touch2touch_core::rig::{PerPad, Rig};
 use touch2touch_core::sample::{DepthCamera, Sample};
@@ -71,6 +73,9 @@ pub struct Loaded {
 const MANY_INVALID: f64 = 0.02;
 /// A larger share of an image that is no measurement than this leaves nothing to answer from.
 const MOST_INVALID: f64 = 0.5;
+
+/// Poses of a data set, spread over it, that must lie in the lab's grid for others to be expected there.
+const POSES_SEEN: usize = 12;
 
 /// Why pixels of an imprint are no measurement.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -127,6 +132,8 @@ pub struct Dataset {
     cameras: OnceLock<PerPad<Arc<DepthCamera>>>,
     /// The units of CAD models that were named for this run only, by tool.
     held_units: Arc<Mutex<BTreeMap<String, ToolUnit>>>,
+    /// Whether the poses that the lab's files give lie in the lab's grid; looked up when first needed.
+    in_lab_grid: OnceLock<bool>,
 }
 
 #[derive(Clone, Debug)]
@@ -201,7 +208,10 @@ impl Dataset {
             },
         };
         let mut scan = found.ok_or_else(|| error::nothing_found(path, other::kind(&absolute, &folder)))?;
-        if scan.kind == SourceKind::Lab && *scan.rig == *Rig::lab() && *rig_of(&scan.root)? != *scan.rig {
+        let declared = if scan.kind == SourceKind::Lab { rig_of(&scan.root)? } else { scan.rig.clone() };
+        if (Rig { camera_tolerance: scan.rig.camera_tolerance, ..(*declared).clone() }) == *scan.rig {
+            scan.rig = declared;
+        } else if *scan.rig == *Rig::lab() {
             let what = format!("{RIG_JSON} declares other sensors, but .pt files are always read as the lab's");
             scan.problems.push(problem(scan.root.join(RIG_JSON), what, "remove it, or save the touches as pictures"));
         }
@@ -235,6 +245,7 @@ impl Dataset {
             meshes: BTreeMap::new(),
             cameras: OnceLock::new(),
             held_units: Arc::default(),
+            in_lab_grid: OnceLock::new(),
         }
     }
 
@@ -283,7 +294,7 @@ impl Dataset {
         self.catch_panic(id, || {
             let mut loaded = match (&self.source, self.files.get(id.0 as usize)) {
                 (Source::BuiltIn(set), _) => set.load(id, alone).map(|sample| Loaded { sample, ..Loaded::default() }),
-                (_, Some(Files::Lab(halves))) => Some(halves.load()?),
+                (_, Some(Files::Lab(halves))) => Some(self.from_lab(halves)?),
                 (_, Some(Files::Row(row))) => Some(row.load(&self.rig)?),
                 (_, Some(Files::Pictures(touch))) => Some(touch.load(&self.rig)?),
                 (_, None) => None,
@@ -298,6 +309,19 @@ impl Dataset {
             self.lend_cameras(&mut loaded.sample);
             Ok(loaded)
         })
+    }
+
+    fn from_lab(&self, halves: &lab::PairFiles) -> Result<Loaded, FileError> {
+        let mut loaded = halves.load(&self.rig)?;
+        loaded.sample.in_lab_grid = *self.in_lab_grid.get_or_init(|| {
+            let pose = |i: usize| match &self.files[i] {
+                Files::Lab(halves) => halves.pose(),
+                _ => None,
+            };
+            let poses: Vec<_> = spread(self.files.len(), POSES_SEEN).into_iter().filter_map(pose).collect();
+            poses.len() == POSES_SEEN && poses.into_iter().all(|pose| Prior::default().allows(pose))
+        });
+        Ok(loaded)
     }
 
     /// Reads something of a pair. A panic is that pair's error: no file may end a run over others.
@@ -318,13 +342,17 @@ impl Dataset {
     /// # Errors
     /// As [`Dataset::tool_mesh`].
     pub(crate) fn tool_with_notes(&self, tool: &str) -> Result<Option<ToolFile>, FileError> {
-        match (self.tool_mesh_file(tool), &self.source) {
+        let mut file = match (self.tool_mesh_file(tool), &self.source) {
             (Some(path), _) => read_tool(path, self.scale_of(tool)).map(Some),
             (None, Source::Lab { .. } | Source::Depths) => Ok(None),
             (None, Source::Pictures | Source::BuiltIn(_)) => {
                 Ok(built_in::mesh(tool).map(|mesh| ToolFile { mesh, notes: Vec::new() }))
             }
+        }?;
+        if let Some(ToolFile { mesh, .. }) = &mut file {
+            self.cad_axes().for_each(|axes| *mesh = axes.apply(mesh));
         }
+        Ok(file)
     }
 
     /// Unit that was set for a tool's CAD file other than beside it: for this run, else on the command line.

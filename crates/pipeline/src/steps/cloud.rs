@@ -109,7 +109,9 @@ pub fn contact_points(
 /// camera is left out, and a gel: what they look at is a membrane.
 pub fn images<'a>(sample: &'a Sample, imprints: &PerPad<&'a DepthMap>, source: ImprintSource) -> Vec<PadImage<'a>> {
     let predicted = source == ImprintSource::Predicted;
-    let image = |pad| Some(PadImage { imprint: imprints[pad]?, camera: sample.pad(pad)?.camera()?, predicted });
+    let tolerance = sample.rig.camera_tolerance;
+    let image =
+        |pad| Some(PadImage { imprint: imprints[pad]?, camera: sample.pad(pad)?.camera()?, predicted, tolerance });
     sample.rig.pads().filter(|_| !sample.rig.is_gel()).filter_map(image).collect()
 }
 

@@ -273,6 +273,7 @@ impl Estimate {
         let part = pressed_in(sample, tool);
         let of = part.as_ref().unwrap_or(tool);
         let contacts = Contacts { points: self.points().map_err(Clone::clone)?, images: &self.images(sample) };
+        let ask = Ask { in_lab_grid: sample.in_lab_grid, ..ask };
         let mut found = pose(contacts, of, registration, ask, sample.grasp_from_object)?;
         if part.is_some() {
             // A gel has no membrane that could be missing.

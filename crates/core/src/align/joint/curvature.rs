@@ -36,7 +36,7 @@ impl Problem<'_> {
         let patches = self.patches_at(self.answer_band(), PLACES, at);
         let mut joint = Joint { fingers: &patches, kernel_m: KERNEL_M, mask: None, lookups: 0 };
         let information = in_the_hand(&joint.sums(at).h, pose) * self.telling(&patches, at);
-        Uncertainty::new(information, self.centroid(), pose, patches.len().max(1) as f64)
+        Uncertainty::new(information, self.centroid(), pose, (self.tolerance, patches.len().max(1) as f64))
     }
 
     /// Information of what the mean cost of patches rises by: twice the logarithm of how much less likely a pose is.

@@ -113,7 +113,7 @@ impl Evidence {
         let problem = problem(beyond);
         let found = problem.as_ref().map(|problem| problem.evidence(scene, State::from_pose(pose, problem.centroid())));
         let by_membrane = report.joint.is_some_and(|fit| fit.basis.has_membrane());
-        let of_mask = || Uncertainty::of_mask(scene.yz(), &tool.field, pose);
+        let of_mask = || Uncertainty::of_mask(scene.yz(), &tool.field, pose, scene.tolerance());
         let uncertainty = match (&problem, found) {
             (Some(problem), Some((_, own))) => {
                 let (spread, most) =

@@ -21,6 +21,7 @@ use crate::align::{
 };
 use crate::frames::PlanarPose;
 use crate::mesh::sampling::spread;
+use crate::rig::CameraTolerance;
 use crate::symmetry::Symmetry;
 use crate::tent::FreeShape;
 use crate::tool::ToolModel;
@@ -55,8 +56,8 @@ const CLOSE: f64 = 0.15;
 /// hangs from the tool, and of one that reaches the middle plane. Little, because an answer on which the first scouts agree
 /// is hardly ever another pose's.
 const STANDS: [f64; 2] = [0.2, EXPLAINED];
-/// Share of its cost that another pose must be ahead of it.
-const AHEAD: f64 = 0.03;
+/// Share of its cost that another pose must be ahead of it, and where grasps are known to be from the lab's grid.
+const AHEAD: [f64; 2] = [0.03, 0.12];
 /// Most steps in each band.
 const STEPS: usize = 20;
 /// Kernels of the mask's own scouts, meters, wide to narrow.
@@ -103,6 +104,7 @@ pub(super) struct Problem<'a> {
     pub(super) predicted: bool,
     /// True where the tool is looked for beyond the prior.
     wide: bool,
+    pub(super) tolerance: CameraTolerance,
 }
 
 /// Outcome of a search: its starts and their runs.
@@ -239,7 +241,19 @@ impl<'a> Problem<'a> {
             })
         });
         let predicted = scene.images().iter().any(|image| image.predicted);
-        Ok(Some(Self { tool, config, ask, fingers, centroid, mask, not_finite, predicted, free, wide }))
+        Ok(Some(Self {
+            tolerance: scene.tolerance(),
+            tool,
+            config,
+            ask,
+            fingers,
+            centroid,
+            mask,
+            not_finite,
+            predicted,
+            free,
+            wide,
+        }))
     }
 
     /// The point about which everything turns, `(y, z)`, meters.
@@ -430,7 +444,7 @@ impl<'a> Problem<'a> {
         }
         // One in the prior stays unless another one is ahead.
         let first = runs.last().filter(|first| known.is_some() && self.allowed(first));
-        let limit = first.map_or(f64::INFINITY, |first| first.cost * (1.0 - AHEAD));
+        let limit = first.map_or(f64::INFINITY, |first| first.cost * (1.0 - AHEAD[usize::from(self.ask.in_lab_grid)]));
         let ends = runs.iter().map(|at| (at.state.to_pose(self.centroid), at.cost));
         let ends = ends.filter(|(pose, _)| self.config.allows(*pose)).collect();
         let found = (0..runs.len()).filter(|run| self.config.allows(runs[*run].state.to_pose(self.centroid)));

@@ -51,7 +51,7 @@ impl Touch {
     }
 
     pub(super) fn images(&self) -> Vec<PadImage<'_>> {
-        (0..2).map(|f| PadImage { imprint: &self.imprints[f], camera: &self.cameras[f], predicted: false }).collect()
+        (0..2).map(|f| PadImage::measured(&self.imprints[f], &self.cameras[f])).collect()
     }
 
     pub(super) fn by(&self, method: &dyn Register) -> Result<AlignReport, AlignError> {
@@ -111,16 +111,16 @@ fn where_the_membrane_says_nothing_the_mask_answers_bit_for_bit_and_it_is_said()
     };
     same(&touch, &[], Basis::NoImage);
     let nothing = DepthMap::filled(175, 140, f32::NAN);
-    let image = |imprint, f: usize| PadImage { imprint, camera: &touch.cameras[f], predicted: false };
+    let image = |imprint, f: usize| PadImage::measured(imprint, &touch.cameras[f]);
     same(&touch, &[image(&nothing, 0), image(&nothing, 1)], Basis::NoZone);
     let small = DepthMap::filled(5, 4, 0.0);
     same(&touch, &[image(&small, 0)], Basis::NoZone);
     let mut lost = touch.cameras[0].clone();
     lost.grasp_from_camera.translation.x = f64::NAN;
-    same(&touch, &[PadImage { imprint: &touch.imprints[0], camera: &lost, predicted: false }], Basis::NoZone);
+    same(&touch, &[PadImage::measured(&touch.imprints[0], &lost)], Basis::NoZone);
     let mut empty = touch.cameras[0].clone();
     empty.depth_reference.as_mut_slice().fill(f32::INFINITY);
-    same(&touch, &[PadImage { imprint: &touch.imprints[0], camera: &empty, predicted: false }], Basis::NoZone);
+    same(&touch, &[PadImage::measured(&touch.imprints[0], &empty)], Basis::NoZone);
     // Membranes that nothing pushed in: where they would pass the middle plane they stop there.
     let free = [0, 1].map(|f: usize| {
         let camera = &touch.cameras[f];

@@ -370,7 +370,7 @@ impl Scanner {
 impl PairFiles {
     /// The cameras of a bubble file.
     pub(super) fn cameras(bubble: &Path) -> Result<PerPad<DepthCamera>, FileError> {
-        let sample = Self { gelslim: None, bubble: Some(bubble.to_owned()) }.load()?.sample;
+        let sample = Self { gelslim: None, bubble: Some(bubble.to_owned()) }.load(&Rig::lab())?.sample;
         Ok(sample.pads.map(|touch| touch?.depth()?.camera.clone()))
     }
 }

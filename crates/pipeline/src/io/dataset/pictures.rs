@@ -331,7 +331,7 @@ impl Touch {
         }
         let pads = rig.pads().map(|pad| (pad.index() == 0).then(|| touch.clone())).collect();
         let rig = rig.clone();
-        let sample = Sample { rig, pads, grasp_from_object: None, scale, laid, reading, taken_by, notes };
+        let sample = Sample { rig, pads, scale, laid, reading, taken_by, notes, ..Sample::default() };
         Ok(Loaded { sample, invalid: Default::default() })
     }
 }

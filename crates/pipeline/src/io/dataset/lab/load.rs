@@ -1,6 +1,7 @@
 //! Reading one grasp of the lab's files: keys, shapes and units as in the released data set.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use glam::DAffine3;
 
@@ -26,7 +27,7 @@ const SAME_POSE: f64 = 1e-5;
 
 impl PairFiles {
     /// Loads one pair; either half may be absent.
-    pub(in super::super) fn load(&self) -> Result<Loaded, FileError> {
+    pub(in super::super) fn load(&self, rig: &Arc<Rig>) -> Result<Loaded, FileError> {
         let mut notes = Vec::new();
         let mut invalid = [InvalidPixels::default(); 2];
         let mut fingers = [PadTouch::default(), PadTouch::default()];
@@ -58,11 +59,23 @@ impl PairFiles {
                 "the two halves are from different grasps; check how the files were named",
             ));
         }
-        let grasp_from_object =
-            poses.first().map(|(_, [theta, x, y])| PlanarPose::object_from_grasp_of_lab(*theta, *x, *y).inverse());
-        let sample = Sample { pads: fingers.map(Some).into(), grasp_from_object, notes, ..Sample::default() };
+        let grasp_from_object = poses.first().map(|(_, pose)| grasp_from_object(*pose));
+        let sample =
+            Sample { rig: rig.clone(), pads: fingers.map(Some).into(), grasp_from_object, notes, ..Sample::default() };
         Ok(Loaded { sample, invalid: invalid.map(Some).into() })
     }
+}
+
+impl PairFiles {
+    /// The true pose of the pair alone, where its files can be read and have one.
+    pub(in super::super) fn pose(&self) -> Option<PlanarPose> {
+        let dict = read_dict(self.bubble.as_deref().or(self.gelslim.as_deref())?).ok()?;
+        pose(&dict, &mut Vec::new()).ok()?.map(grasp_from_object)
+    }
+}
+
+fn grasp_from_object([theta, x, y]: [f64; 3]) -> PlanarPose {
+    PlanarPose::object_from_grasp_of_lab(theta, x, y).inverse()
 }
 
 /// A value that the sample can do without: absent, or no tensor, is a note; wrong is an error.
