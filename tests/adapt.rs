@@ -18,7 +18,7 @@ use touch2touch_pipeline::steps::models::Models;
 use touch2touch_pipeline::steps::recipe::Recipe;
 
 use crate::cli_generate::full_size_bundle;
-use crate::support::{error_text, json, run, shared, simulate};
+use crate::support::{cancelled_when, error_text, json, run, shared, simulate};
 
 /// Pairs of pictures: a touch somewhere, seen by the lights of a GelSlim, and its imprint, moved and under a pattern.
 fn pictures(folder: &Path, count: usize) {
@@ -201,14 +201,8 @@ fn a_run_that_is_stopped_goes_on_to_the_same_last_bit() {
     assert!(straight.warnings.iter().any(|w| w.contains("2 tuning steps are few")), "{:?}", straight.warnings);
     // Stopped in the run on all, between its steps.
     let kept = dir.path().join("unfinished");
-    let cancel = Cancel::default();
-    let told = cancel.clone();
-    let watch = move |progress: Progress| {
-        if progress.total == 6 && progress.done >= 5 {
-            told.cancel();
-        }
-    };
-    let stopped = adapt(&dataset, &setup(Some(kept.clone())), &models, &JobCx::new(cancel, Arc::new(watch)));
+    let stopping = cancelled_when(|progress| progress.total == 6 && progress.done >= 5);
+    let stopped = adapt(&dataset, &setup(Some(kept.clone())), &models, &stopping);
     assert_eq!(stopped.unwrap_err().kind, TaskErrorKind::Cancelled);
     let seen = Arc::new(Mutex::new(Vec::new()));
     let sink = seen.clone();

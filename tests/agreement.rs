@@ -42,7 +42,7 @@ use touch2touch_pipeline::io::dataset::Dataset;
 use touch2touch_pipeline::io::images;
 use touch2touch_pipeline::labels::Labels;
 
-use crate::support::{run, simulate};
+use crate::support::{files_below, run, simulate};
 
 #[test]
 pub(crate) fn what_is_said_of_a_data_set_is_the_same_in_the_panel_and_by_the_verb() {
@@ -204,19 +204,9 @@ fn on_a_lab_folder_drawn_masks_and_reviews_count_in_both() {
     let by_verb = home.path().join("by_verb");
     let export = json(&["masks", "export", path, "--pairs", "begun", "--out", by_verb.to_str().unwrap()], home.path());
     assert_eq!((&export["corrected"], &export["left_out"]), (&2.into(), &serde_json::json!({ "skip": 1 })));
-    let files = |root: &Path| {
-        let mut found = BTreeMap::new();
-        let mut folders = vec![root.to_owned()];
-        while let Some(folder) = folders.pop() {
-            for entry in std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
-                if entry.is_dir() {
-                    folders.push(entry);
-                } else {
-                    found.insert(entry.strip_prefix(root).unwrap().to_owned(), std::fs::read(&entry).unwrap());
-                }
-            }
-        }
-        found
+    let files = |root: &Path| -> BTreeMap<PathBuf, Vec<u8>> {
+        let name = |file: &Path| file.strip_prefix(root).unwrap().to_owned();
+        files_below(root).iter().map(|file| (name(file), std::fs::read(file).unwrap())).collect()
     };
     let (studios, verbs) = (files(&exported), files(&by_verb));
     assert!(studios.len() >= 4, "{:?}", studios.keys());

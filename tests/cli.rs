@@ -10,7 +10,7 @@ use touch2touch_core::pose::Registration;
 use touch2touch_pipeline::io::dataset::Dataset;
 use touch2touch_pipeline::io::masks::{ByImprint, MaskStore, StoredReview};
 
-use crate::support::{self, error_text, json, run, simulate, tiny};
+use crate::support::{self, assert_says, error_text, json, run, simulate, simulated, succeed, tiny};
 
 mod documented;
 mod hostile;
@@ -32,19 +32,15 @@ fn a_simulated_dataset_is_sound_has_poses_and_exports_masks() {
     let (set_text, data_path) = (set.to_str().unwrap(), data.as_path());
 
     let tools = "pattern_04_3_lines_angle_1,pattern_36";
-    let made =
-        run(&["simulate", "--out", set_text, "--tools", tools, "--grasps", "2", "--seed", "7", "--json"], data_path);
-    assert!(made.status.success(), "{}", error_text(&made));
+    let words = ["simulate", "--out", set_text, "--tools", tools, "--grasps", "2", "--seed", "7", "--json"];
+    let made = succeed(&words, data_path);
     assert_eq!(json(&made)["pairs"], 4);
 
-    let doctor = run(&["doctor", set_text, "--no-predictions", "--json"], data_path);
-    assert!(doctor.status.success(), "{}", error_text(&doctor));
+    let doctor = succeed(&["doctor", set_text, "--no-predictions", "--json"], data_path);
     assert_eq!(json(&doctor)["pairs"], 4);
     assert_eq!(json(&doctor)["problems"], Value::Array(vec![]), "our own files are sound");
 
-    let pose = run(&["pose", set_text, "--mask", "cad", "--engine", "all", "--json"], data_path);
-    assert!(pose.status.success(), "{}", error_text(&pose));
-    let report = json(&pose);
+    let report = json(&succeed(&["pose", set_text, "--mask", "cad", "--engine", "all", "--json"], data_path));
     let cases = report["cases"].as_array().unwrap();
     assert_eq!(cases.len(), 4 * Registration::iter().count(), "four pairs, all engines");
     for case in cases {
@@ -101,9 +97,7 @@ fn a_simulated_dataset_is_sound_has_poses_and_exports_masks() {
     assert_eq!(nothing.status.code(), Some(2), "nothing was corrected by hand yet");
     assert!(error_text(&nothing).contains("--pairs all"));
     let all = ["masks", "export", set_text, "--out", masks.to_str().unwrap(), "--pairs", "all", "--json"];
-    let exported = run(&all, data_path);
-    assert!(exported.status.success(), "{}", error_text(&exported));
-    let counts = json(&exported);
+    let counts = json(&succeed(&all, data_path));
     let total: i64 = ["train", "val", "test"].iter().map(|k| counts[k].as_i64().unwrap()).sum();
     assert_eq!(total, 8, "two fingers of four pairs");
     assert!(touch2touch_pipeline::io::exchange::list(&masks, None).unwrap().refused.is_empty());
@@ -130,9 +124,7 @@ fn what_cannot_be_done_is_said_and_is_no_success() {
 fn the_lab_sample_is_within_two_degrees() {
     let Some(lab) = support::shared("lab-sample") else { return };
     let dir = tempfile::tempdir().unwrap();
-    let pose = run(&["pose", lab.to_str().unwrap(), "--mask", "cad", "--json"], dir.path());
-    assert!(pose.status.success(), "{}", error_text(&pose));
-    let report = json(&pose);
+    let report = json(&succeed(&["pose", lab.to_str().unwrap(), "--mask", "cad", "--json"], dir.path()));
     assert_eq!(report["cases"].as_array().unwrap().len(), 4);
     for case in report["cases"].as_array().unwrap() {
         assert!(case["error_deg"].as_f64().unwrap() < 2.0, "{case}");
@@ -144,8 +136,7 @@ fn the_five_faults_are_written_and_told_apart() {
     let dir = tempfile::tempdir().unwrap();
     let set = dir.path().join("faults");
     let set_text = set.to_str().unwrap();
-    let made = run(&["simulate", "--faults", "--out", set_text, "--json"], dir.path());
-    assert!(made.status.success(), "{}", error_text(&made));
+    let made = succeed(&["simulate", "--faults", "--out", set_text, "--json"], dir.path());
     assert_eq!(json(&made)["faults"].as_object().unwrap().len(), 5);
 
     let doctor = json(&run(&["doctor", set_text, "--no-predictions", "--json"], dir.path())).to_string();
@@ -174,11 +165,8 @@ fn the_results_table_is_printed_and_written() {
     let (data, set) = (dir.path().join("data"), dir.path().join("set"));
     let set_text = set.to_str().unwrap();
     let tools = "pattern_31_rod,pattern_36";
-    let made = run(
-        &["simulate", "--out", set_text, "--tools", tools, "--grasps", "2", "--condition", "mixed", "--json"],
-        &data,
-    );
-    assert!(made.status.success(), "{}", error_text(&made));
+    let words = ["simulate", "--out", set_text, "--tools", tools, "--grasps", "2", "--condition", "mixed", "--json"];
+    let made = succeed(&words, &data);
     assert_eq!(json(&made)["tools"].as_array().unwrap().len(), 4, "both tools, and both on a bare shaft");
 
     let bundle = |name: &str| tiny(name).display().to_string();
@@ -187,12 +175,9 @@ fn the_results_table_is_printed_and_written() {
     let mut args = vec!["evaluate", set_text, "--bundle", &generator, "--bundle", &generator];
     args.extend(["--mask-bundle", &mask, "--classifier", &classifier, "--resamples", "50", "--paper"]);
     args.extend(["--csv", lines.to_str().unwrap()]);
-    let text = run(&args, &data);
-    assert!(text.status.success(), "{}", error_text(&text));
-    let text = String::from_utf8_lossy(&text.stdout).into_owned();
-    for expected in ["Unseen grasps of seen tools", "Unseen tools", "Measured (upper bound)", "Paper: VQ-VAE", "95 %"] {
-        assert!(text.contains(expected), "`{expected}` is missing in:\n{text}");
-    }
+    let text = String::from_utf8(succeed(&args, &data).stdout).unwrap();
+    let all = ["Unseen grasps of seen tools", "Unseen tools", "Measured (upper bound)", "Paper: VQ-VAE", "95 %"];
+    assert_says(&text, &all);
     assert_eq!(std::fs::read_to_string(&lines).unwrap().lines().count(), 1 + 2 * 6, "six rows, two groups");
 
     args.extend(["--json", "--pairs"]);

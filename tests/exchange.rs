@@ -16,10 +16,10 @@ use touch2touch_pipeline::io::dataset::Dataset;
 use touch2touch_pipeline::io::exchange::{Format, MANIFEST, PARTS};
 use touch2touch_pipeline::io::images;
 use touch2touch_pipeline::io::simulated::Layout;
-use touch2touch_pipeline::job::{Cancel, JobCx, Progress};
+use touch2touch_pipeline::job::JobCx;
 use touch2touch_pipeline::labels::{DrawnMask, Labels, MaskPlace, Operation, PairLabels, Review};
 
-use crate::support::write_grasps;
+use crate::support::{cancelled_when, write_grasps};
 
 /// A data set of four grasps whose masks Anna painted, each with some ignored pixels and one without contact; the last pair
 /// is in progress, the others are done.
@@ -236,18 +236,11 @@ fn an_import_stops_between_pairs_and_keeps_what_was_done() {
     let folder = dir.path().join("png");
     export(&dataset, &folder, Format::Png);
     forget(&dataset);
-    let cancel = Cancel::default();
-    let told = cancel.clone();
-    let watch = move |progress: Progress| {
-        if progress.done == 1 {
-            told.cancel();
-        }
-    };
-    let found = import_masks(&dataset, &from(&folder), &JobCx::new(cancel.clone(), Arc::new(watch))).unwrap();
+    let cx = cancelled_when(|progress| progress.done == 1);
+    let found = import_masks(&dataset, &from(&folder), &cx).unwrap();
     assert_eq!((found.new, found.changed.len(), found.complete), (4, 2, false), "{found:?}");
     assert!(found.text().contains("stopped early"));
     assert_eq!(all(&dataset).len(), 4);
     // Before the first it is an error.
-    let cx = JobCx::new(cancel, Arc::new(|_| {}));
     assert!(import_masks(&dataset, &from(&folder), &cx).unwrap_err().is_cancelled());
 }

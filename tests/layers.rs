@@ -5,7 +5,7 @@ mod skips;
 
 use std::path::{Path, PathBuf};
 
-use super::support::rust_files;
+use super::support::{files_below, rust_files};
 
 /// What the code in a folder must not name, each with the reason. What lies in another crate needs no line where the
 /// manifest does not list it.
@@ -97,8 +97,7 @@ fn is_named(code: &str, name: &str) -> bool {
 /// The code of the files of a folder and of the file of its name, with each name spelt out; tests left out.
 fn layer(folder: &str) -> Vec<(PathBuf, String)> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
-    let mut files = Vec::new();
-    rust_files(&folder, &mut files);
+    let mut files = rust_files(&folder);
     files.extend(Some(folder.with_extension("rs")).filter(|file| file.is_file()));
     files.retain(|file| !file.ends_with("tests.rs"));
     assert!(files.len() > 3, "{}: the scan sees too little", folder.display());
@@ -156,10 +155,7 @@ const MAY_OPEN: &[&str] = &["io/files.rs", "io/atomic.rs"];
 
 #[test]
 fn readers_open_ordinary_files_only() {
-    let mut files = Vec::new();
-    for layer in ["crates/pipeline/src", "src/app"] {
-        rust_files(&Path::new(env!("CARGO_MANIFEST_DIR")).join(layer), &mut files);
-    }
+    let files = ["crates/pipeline/src", "src/app"].map(rust_files).concat();
     let mut broken = Vec::new();
     for file in files.iter().filter(|file| !MAY_OPEN.iter().any(|may| file.ends_with(may))) {
         let code = code(&std::fs::read_to_string(file).unwrap());
@@ -172,13 +168,7 @@ fn readers_open_ordinary_files_only() {
 
 #[test]
 fn files_can_be_held_in_the_head() {
-    let mut files = Vec::new();
-    for dir in ["src", "crates", "tests", "benches", "examples"] {
-        let dir = Path::new(env!("CARGO_MANIFEST_DIR")).join(dir);
-        if dir.is_dir() {
-            rust_files(&dir, &mut files);
-        }
-    }
+    let files = ["src", "crates", "tests", "benches", "examples"].map(rust_files).concat();
     assert!(files.len() > 30, "the scan found too few files to mean anything");
     let long: Vec<String> = files
         .iter()
@@ -192,30 +182,20 @@ fn files_can_be_held_in_the_head() {
 
 #[test]
 fn assets_stay_small() {
-    fn bytes(dir: &Path) -> u64 {
-        std::fs::read_dir(dir)
-            .unwrap()
-            .map(|e| {
-                let path = e.unwrap().path();
-                if path.is_dir() { bytes(&path) } else { path.metadata().unwrap().len() }
-            })
-            .sum()
-    }
-    let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets");
-    assert!(bytes(&assets) < 30_000_000, "assets must stay under 30 MB");
+    let assets = files_below(&Path::new(env!("CARGO_MANIFEST_DIR")).join("assets"));
+    let bytes: u64 = assets.iter().map(|file| file.metadata().unwrap().len()).sum();
+    assert!(bytes < 30_000_000, "assets must stay under 30 MB");
 }
 
 #[test]
 fn no_text_of_the_window_says_a_key_by_hand() {
     use strum::IntoEnumIterator as _;
     use touch2touch::app::action::Action;
-    let mut files = Vec::new();
-    rust_files(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src/ui"), &mut files);
     // Escape closes what covers the panes and Enter takes what was typed, whatever their actions are.
     let keys = Action::iter().flat_map(|action| action.keys().iter().copied());
     let keys: Vec<_> = keys.filter(|key| !matches!(key.key, "Esc" | "Enter")).collect();
     let mut filled = 0;
-    for file in files {
+    for file in rust_files("src/ui") {
         let text = code(&std::fs::read_to_string(&file).unwrap());
         for key in &keys {
             let said = text.contains(&format!(" ({key})")) || (key.ctrl && text.contains(&key.to_string()));

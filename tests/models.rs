@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use touch2touch_pipeline::infer::bundle::{Bundle, MANIFEST, find};
 
-use crate::support::{edit_json, tiny, tiny_with};
+use crate::support::{assert_says, edit_json, tiny, tiny_with};
 
 /// Everything said about a bundle that must be refused.
 fn refusal(dir: &Path) -> String {
@@ -36,13 +36,14 @@ fn a_tool_classifier_opens_and_a_wrong_one_is_refused() {
         m["input"]["rotation_deg"] = serde_json::json!(90);
     });
     let text = refusal(dir.path());
-    for expected in [
-        "output.classes: not usable",
-        "input.rotation_deg: not supported",
-        "tool_classifier.onnx: output `features`: shape [N, 4], but the manifest says [N, 5]",
-    ] {
-        assert!(text.contains(expected), "`{expected}` is missing in:\n{text}");
-    }
+    assert_says(
+        &text,
+        &[
+            "output.classes: not usable",
+            "input.rotation_deg: not supported",
+            "tool_classifier.onnx: output `features`: shape [N, 4], but the manifest says [N, 5]",
+        ],
+    );
     edit_json(&dir.path().join(MANIFEST), |m| m["output"]["classes"] = serde_json::json!(["a", "b"]));
     let text = refusal(dir.path());
     assert!(text.contains("output `logits`: shape [N, 3], but the manifest says [N, 2]"), "{text}");
@@ -69,20 +70,21 @@ fn a_refusal_lists_everything_that_is_wrong() {
         m.as_object_mut().unwrap().remove("condition");
     });
     let text = refusal(dir.path());
-    for expected in [
-        "condition_encoder.onnx: cannot be read",
-        "decoder.onnx: its SHA-256 is not the manifest's",
-        "input.std: not positive",
-        "schedule: the betas run from 0.0015 to 1.5",
-        "output.range_m: empty",
-        "output.window_px: outside the imprint",
-        "prediction: unknown variant `velocity`",
-        "surprise: unknown key",
-        "condition: missing",
-        "defaults.eta: out of range",
-    ] {
-        assert!(text.contains(expected), "`{expected}` is missing in:\n{text}");
-    }
+    assert_says(
+        &text,
+        &[
+            "condition_encoder.onnx: cannot be read",
+            "decoder.onnx: its SHA-256 is not the manifest's",
+            "input.std: not positive",
+            "schedule: the betas run from 0.0015 to 1.5",
+            "output.range_m: empty",
+            "output.window_px: outside the imprint",
+            "prediction: unknown variant `velocity`",
+            "surprise: unknown key",
+            "condition: missing",
+            "defaults.eta: out of range",
+        ],
+    );
 }
 
 #[test]
@@ -93,15 +95,16 @@ fn shapes_that_disagree_with_the_manifest_are_refused() {
         m["input"]["size"] = serde_json::json!([16, 32]);
     });
     let text = refusal(dir.path());
-    for expected in [
-        "denoiser.onnx: input `latent`: shape [N, 4, 4, 4], but the manifest says [N, 3, 4, 4]",
-        "denoiser.onnx: output `prediction`: shape",
-        "decoder.onnx: input `latent`: shape",
-        "decoder.onnx: output `image`: shape [N, 3, 16, 16], but the manifest says [N, 1, 16, 16]",
-        "condition_encoder.onnx: input `gelslim`: shape [N, 3, 16, 16], but the manifest says [N, 3, 32, 16]",
-    ] {
-        assert!(text.contains(expected), "`{expected}` is missing in:\n{text}");
-    }
+    assert_says(
+        &text,
+        &[
+            "denoiser.onnx: input `latent`: shape [N, 4, 4, 4], but the manifest says [N, 3, 4, 4]",
+            "denoiser.onnx: output `prediction`: shape",
+            "decoder.onnx: input `latent`: shape",
+            "decoder.onnx: output `image`: shape [N, 3, 16, 16], but the manifest says [N, 1, 16, 16]",
+            "condition_encoder.onnx: input `gelslim`: shape [N, 3, 16, 16], but the manifest says [N, 3, 32, 16]",
+        ],
+    );
 }
 
 #[test]
@@ -416,7 +419,7 @@ mod trial {
     use std::process::Output;
 
     use super::*;
-    use crate::support::{run, simulate};
+    use crate::support::{json, run, simulated, succeed};
 
     fn text(output: &Output) -> String {
         String::from_utf8_lossy(&[output.stdout.as_slice(), &output.stderr].concat()).into_owned()
@@ -480,9 +483,7 @@ mod trial {
     fn whole_bundles_are_taken_and_the_verdict_is_kept() {
         let data = tempfile::tempdir().unwrap();
         for name in ["generator", "mask", "classifier"] {
-            let checked = run(&["bundle", "check", tiny(name).to_str().unwrap(), "--json"], data.path());
-            assert!(checked.status.success(), "{}", text(&checked));
-            let report: serde_json::Value = serde_json::from_slice(&checked.stdout).unwrap();
+            let report = json(&succeed(&["bundle", "check", tiny(name).to_str().unwrap(), "--json"], data.path()));
             assert_eq!((&report["engines"][0], &report["problems"]), (&"rten".into(), &serde_json::json!([])));
         }
         assert!(kept(data.path()) >= 3);
@@ -497,9 +498,7 @@ mod trial {
             let checked = run(&["bundle", "check", dir.path().to_str().unwrap()], data.path());
             let said = text(&checked);
             assert_eq!(checked.status.code(), Some(1), "{said}");
-            for expected in ["rten (built in) does not take", "`mask_unet`", "memory"] {
-                assert!(said.contains(expected), "`{expected}` is missing in:\n{said}");
-            }
+            assert_says(&said, &["rten (built in) does not take", "`mask_unet`", "memory"]);
         }
         assert_eq!(kept(data.path()), 0);
     }
@@ -522,9 +521,7 @@ mod trial {
     /// The verbs and the studio open a bundle by the same functions: none of them comes to the engine.
     #[test]
     fn a_verb_refuses_such_a_bundle_before_its_engine_sees_it() {
-        let data = tempfile::tempdir().unwrap();
-        let set = data.path().join("set");
-        simulate(&set, "pattern_36", &["--grasps", "1"]);
+        let (data, set) = simulated("pattern_36", &["--grasps", "1"]);
         let pose = |bundle: &Path| {
             let args = ["pose", set.to_str().unwrap(), "--mask", "unet", "--runtime", "rten", "--mask-bundle"];
             run(&[&args[..], &[bundle.to_str().unwrap()]].concat(), data.path())

@@ -13,6 +13,7 @@ use touch2touch_core::catalog::ToolSpec;
 use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::sim;
 use touch2touch_pipeline::io::simulated::{Layout, pair_paths, write_pair, write_tools};
+use touch2touch_pipeline::job::{Cancel, JobCx, Progress};
 
 /// A folder of real and reference data that only some machines have: in `TOUCH2TOUCH_SHARED`, else in `../shared` beside
 /// the checkout. `REQUIRE_SHARED=1` demands it.
@@ -33,9 +34,17 @@ pub(crate) fn gpu() -> Option<touch2touch::gpu::Gpu> {
 }
 
 /// A Python with PyTorch, named by `TOUCH2TOUCH_TORCH_PYTHON`. `REQUIRE_TORCH=1` demands it.
-pub(crate) fn torch() -> Option<OsString> {
+fn torch() -> Option<OsString> {
     let python = std::env::var_os("TOUCH2TOUCH_TORCH_PYTHON");
     python.or_else(|| left_out("TOUCH2TOUCH_TORCH_PYTHON is not set: PyTorch itself is not asked", "REQUIRE_TORCH"))
+}
+
+/// Runs a script on files in that Python, where there is one.
+pub(crate) fn torch_runs(script: &str, files: &[PathBuf]) {
+    let Some(python) = torch() else { return };
+    let mut command = Command::new(python);
+    let out = command.args(["-c", script]).args(files).env("OMP_NUM_THREADS", "1").output().unwrap();
+    assert!(out.status.success(), "{}", error_text(&out));
 }
 
 /// A Python with the package installed, named by `TOUCH2TOUCH_PYTHON`, as the check script has made it. `REQUIRE_PYTHON=1`
@@ -70,6 +79,13 @@ fn require(variable: &str) -> bool {
 /// Runs the program; `data` stands for all folders of the user.
 pub(crate) fn run(args: &[&str], data: &Path) -> Output {
     command(args, data).output().unwrap()
+}
+
+/// As [`run`], where the program must succeed.
+pub(crate) fn succeed(args: &[&str], data: &Path) -> Output {
+    let output = run(args, data);
+    assert!(output.status.success(), "{}", error_text(&output));
+    output
 }
 
 /// The program as [`run`] runs it.
@@ -139,8 +155,41 @@ pub(crate) fn error_text(output: &Output) -> String {
 /// Has the program write simulated grasps.
 pub(crate) fn simulate(set: &Path, tools: &str, words: &[&str]) {
     let fixed = ["simulate", "--out", set.to_str().unwrap(), "--tools", tools];
-    let made = run(&[&fixed[..], words].concat(), set.parent().unwrap());
-    assert!(made.status.success(), "{}", error_text(&made));
+    succeed(&[&fixed[..], words].concat(), set.parent().unwrap());
+}
+
+/// A folder and the set of simulated grasps in it.
+pub(crate) fn simulated(tools: &str, words: &[&str]) -> (tempfile::TempDir, PathBuf) {
+    let dir = tempfile::tempdir().unwrap();
+    let set = dir.path().join("set");
+    simulate(&set, tools, words);
+    (dir, set)
+}
+
+/// Asserts that a text has all of these parts.
+pub(crate) fn assert_says(text: &str, all: &[&str]) {
+    for expected in all {
+        assert!(text.contains(*expected), "`{expected}` is missing in:\n{text}");
+    }
+}
+
+/// A job that is cancelled once its progress is so.
+pub(crate) fn cancelled_when(so: impl Fn(Progress) -> bool + Send + Sync + 'static) -> JobCx {
+    let cancel = Cancel::default();
+    let told = cancel.clone();
+    let watch = move |progress: Progress| {
+        if so(progress) {
+            told.cancel();
+        }
+    };
+    JobCx::new(cancel, Arc::new(watch))
+}
+
+/// A tetrahedron with three edges of this length along the axes.
+pub(crate) fn tetrahedron(size: f64) -> TriMesh {
+    let corners = [[0.0; 3], [size, 0.0, 0.0], [0.0, size, 0.0], [0.0, 0.0, size]];
+    let triangles = vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+    TriMesh { vertices: corners.map(glam::DVec3::from_array).to_vec(), triangles }
 }
 
 /// A tiny bundle of the tests, written by `make_bundles.py` there.
@@ -175,14 +224,15 @@ pub(crate) fn copy_folder(from: &Path, to: &Path) {
     }
 }
 
-/// All Rust files below a folder.
-pub(crate) fn rust_files(dir: &Path, out: &mut Vec<PathBuf>) {
-    for entry in std::fs::read_dir(dir).unwrap() {
-        let path = entry.unwrap().path();
-        if path.is_dir() {
-            rust_files(&path, out);
-        } else if path.extension().is_some_and(|e| e == "rs") {
-            out.push(path);
-        }
-    }
+/// All files below a folder.
+pub(crate) fn files_below(folder: &Path) -> Vec<PathBuf> {
+    let inside = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    inside.flat_map(|path| if path.is_dir() { files_below(&path) } else { vec![path] }).collect()
+}
+
+/// All Rust files below a folder of the repository.
+pub(crate) fn rust_files(folder: impl AsRef<Path>) -> Vec<PathBuf> {
+    let mut files = files_below(&Path::new(env!("CARGO_MANIFEST_DIR")).join(folder));
+    files.retain(|path| path.extension().is_some_and(|e| e == "rs"));
+    files
 }

@@ -16,14 +16,14 @@ use touch2touch_pipeline::export::{DrawnMasks, LeftOut};
 use touch2touch_pipeline::infer::engine::EngineChoice;
 use touch2touch_pipeline::io::dataset::Dataset;
 use touch2touch_pipeline::io::simulated::Layout;
-use touch2touch_pipeline::job::{Cancel, JobCx, Progress};
+use touch2touch_pipeline::job::JobCx;
 use touch2touch_pipeline::labels::{DrawnMask, ImprintOf, Labels, MaskPlace, Operation, Review};
 use touch2touch_pipeline::learn::train::{TrainChoice, TrainSetup, Trained, plan, train};
 use touch2touch_pipeline::learn::tuning::Tuning;
 use touch2touch_pipeline::steps::bundles::{self, BundleKind, find};
 use touch2touch_pipeline::steps::models::Models;
 
-use crate::support::{command, json, run, tiny, write_grasps};
+use crate::support::{cancelled_when, command, json, run, succeed, tiny, write_grasps};
 
 /// Simulated grasps of two tools, all of whose masks were corrected to the truth by a person and marked done.
 pub(crate) fn corrected(root: &Path, grasps: u64) {
@@ -41,6 +41,14 @@ pub(crate) fn corrected(root: &Path, grasps: u64) {
         stored.review = Review::Done;
         labels.save(&entry.name, &stored, &Operation { person: Some("Anna".into()), ..Operation::default() }).unwrap();
     }
+}
+
+/// A folder and such a data set of it.
+fn opened(grasps: u64) -> (tempfile::TempDir, Dataset) {
+    let dir = tempfile::tempdir().unwrap();
+    let set = dir.path().join("set");
+    corrected(&set, grasps);
+    (dir, Dataset::open(&set).unwrap())
 }
 
 fn review(dataset: &Dataset, at: usize, review: Review) {
@@ -81,10 +89,8 @@ pub(crate) fn bytes(folder: &Path) -> Vec<(String, Vec<u8>)> {
 
 #[test]
 fn the_verb_trains_says_what_it_is_worth_and_writes_over_nothing() {
-    let dir = tempfile::tempdir().unwrap();
+    let (dir, dataset) = opened(3);
     let set = dir.path().join("set");
-    corrected(&set, 3);
-    let dataset = Dataset::open(&set).unwrap();
     review(&dataset, 0, Review::InProgress);
     let out = dir.path().join("trained");
     let [set, out] = [&set, &out].map(|path| path.to_str().unwrap());
@@ -117,11 +123,8 @@ fn the_verb_trains_says_what_it_is_worth_and_writes_over_nothing() {
     assert_eq!((&said["persons"], &said["steps"]), (&serde_json::json!(["Anna"]), &3.into()));
     assert_eq!((said["pairs"].as_array().unwrap().len(), said["held_out"].as_array().unwrap().len()), (3, 2));
     assert_eq!(said["before"]["iou"], made["before"]["iou"]);
-    let masked = run(
-        &["pose", set, "--limit", "1", "--mask", "unet", "--mask-bundle", out, "--runtime", "rten", "--json"],
-        dir.path(),
-    );
-    assert!(masked.status.success(), "{}", String::from_utf8_lossy(&masked.stderr));
+    let by_it = ["pose", set, "--limit", "1", "--mask", "unet", "--mask-bundle", out, "--runtime", "rten", "--json"];
+    succeed(&by_it, dir.path());
 
     // Nothing is written over.
     let before = bytes(Path::new(out));
@@ -138,22 +141,13 @@ fn the_verb_trains_says_what_it_is_worth_and_writes_over_nothing() {
 
 #[test]
 fn a_run_that_is_stopped_leaves_no_bundle_and_goes_on_to_the_same_last_bit() {
-    let dir = tempfile::tempdir().unwrap();
-    let set = dir.path().join("set");
-    corrected(&set, 2);
-    let dataset = Dataset::open(&set).unwrap();
+    let (dir, dataset) = opened(2);
     let (straight, stopped) = (dir.path().join("straight"), dir.path().join("stopped"));
     let whole = go(&dataset, &setup(&dataset, straight.clone(), None), &JobCx::unwatched()).unwrap();
     let kept = dir.path().join("unfinished");
     let resumable = setup(&dataset, stopped.clone(), Some(kept.clone()));
-    let cancel = Cancel::default();
-    let told = cancel.clone();
-    let watch = move |progress: Progress| {
-        if progress.total == 3 && progress.done >= 2 {
-            told.cancel();
-        }
-    };
-    let err = go(&dataset, &resumable, &JobCx::new(cancel, Arc::new(watch))).unwrap_err();
+    let stopping = cancelled_when(|progress| progress.total == 3 && progress.done >= 2);
+    let err = go(&dataset, &resumable, &stopping).unwrap_err();
     assert_eq!(err.kind, TaskErrorKind::Cancelled);
     assert!(!stopped.exists(), "a cancelled run leaves no bundle");
     let resumed = go(&dataset, &resumable, &JobCx::unwatched()).unwrap();
@@ -167,10 +161,8 @@ fn a_run_that_is_stopped_leaves_no_bundle_and_goes_on_to_the_same_last_bit() {
 #[test]
 fn a_killed_training_leaves_no_bundle_that_cannot_be_opened() {
     const KILLS: u32 = 2;
-    let dir = tempfile::tempdir().unwrap();
+    let (dir, dataset) = opened(1);
     let set = dir.path().join("set");
-    corrected(&set, 1);
-    let dataset = Dataset::open(&set).unwrap();
     let labels = || -> Vec<_> {
         let all = Labels::of(&dataset);
         dataset.index.pairs.iter().map(|entry| all.load(&entry.name).unwrap()).collect()
@@ -215,10 +207,7 @@ fn a_killed_training_leaves_no_bundle_that_cannot_be_opened() {
 
 #[test]
 fn masks_on_predictions_are_learned_from_where_the_prediction_can_be_made_again() {
-    let dir = tempfile::tempdir().unwrap();
-    let set = dir.path().join("set");
-    corrected(&set, 1);
-    let dataset = Dataset::open(&set).unwrap();
+    let (dir, dataset) = opened(1);
     let (labels, name) = (Labels::of(&dataset), &dataset.index.pairs[0].name);
     let generator = find(&[]).take(BundleKind::Generator, None, &dataset.rig).unwrap();
     let config = GenerateConfig { steps: 1, ..generator.generator.as_ref().unwrap().defaults };
@@ -286,10 +275,7 @@ fn ignored_pixels_are_neither_learned_from_nor_scored() {
 
 #[test]
 fn what_cannot_be_trained_is_refused_and_says_what_to_do() {
-    let dir = tempfile::tempdir().unwrap();
-    let set = dir.path().join("set");
-    corrected(&set, 1);
-    let dataset = Dataset::open(&set).unwrap();
+    let (dir, dataset) = opened(1);
     let new = |change: &dyn Fn(&mut TrainSetup)| {
         let mut setup = setup(&dataset, dir.path().join("new"), None);
         change(&mut setup);

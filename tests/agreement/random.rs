@@ -166,6 +166,13 @@ fn written(value: &(impl Serialize + ?Sized)) -> Value {
     serde_json::from_str(&serde_json::to_string(value).unwrap()).unwrap()
 }
 
+/// A value without what no two runs share.
+fn without(mut value: Value, keys: &[&str]) -> Value {
+    let map = value.as_object_mut().unwrap();
+    keys.iter().for_each(|key| drop(map.remove(*key)));
+    value
+}
+
 /// Count of the numbers in a value.
 fn numbers(value: &Value) -> usize {
     match value {

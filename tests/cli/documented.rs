@@ -11,7 +11,7 @@ use touch2touch_pipeline::io::dataset::Dataset;
 use touch2touch_pipeline::io::masks::{MaskStore, StoredMask, StoredReview};
 
 use super::pages::{self, fenced, repository};
-use super::{error_text, run, simulate};
+use super::{error_text, run, simulated, succeed};
 use crate::cli_generate::full_size_bundle;
 
 /// The texts whose commands are run; those of the training are Python's.
@@ -69,9 +69,7 @@ struct Stage {
 
 impl Stage {
     fn new() -> Self {
-        let dir = tempfile::tempdir().unwrap();
-        let set = dir.path().join("set");
-        simulate(&set, "pattern_36", &["--grasps", "1", "--seed", "3"]);
+        let (dir, set) = simulated("pattern_36", &["--grasps", "1", "--seed", "3"]);
         let dataset = Dataset::open(&set).unwrap();
         let name = dataset.index.pairs[0].name.clone();
         // One mask corrected by hand, for the export.
@@ -90,8 +88,7 @@ impl Stage {
         MaskStore::in_folder(dir.path().join("other")).save(&name, lab::RIGHT, Some(&stored)).unwrap();
         store.save_review(&name, &StoredReview { review: "done".into(), ..StoredReview::default() }).unwrap();
         let (set, masks) = (set.to_str().unwrap(), dir.path().join("masks"));
-        let done = run(&["masks", "export", set, "--out", masks.to_str().unwrap()], dir.path());
-        assert!(done.status.success(), "{}", error_text(&done));
+        succeed(&["masks", "export", set, "--out", masks.to_str().unwrap()], dir.path());
         let robot = dir.path().join("robot");
         std::fs::create_dir(&robot).unwrap();
         let touch = dataset.gelslim_file(id).unwrap();

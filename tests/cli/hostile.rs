@@ -10,7 +10,8 @@ use touch2touch_pipeline::io::dataset::Dataset;
 use touch2touch_pipeline::io::masks::MaskStore;
 use touch2touch_pipeline::io::simulated::MANIFEST;
 
-use super::{error_text, json, run};
+use super::{error_text, json, run, simulated, succeed};
+use crate::support::edit_json;
 
 /// A small simulated dataset.
 fn simulate(out: &Path, more: &[&str]) -> std::process::Output {
@@ -27,10 +28,7 @@ fn files(folder: &Path) -> Vec<String> {
 
 #[test]
 fn a_simulation_never_mixes_with_another_dataset_and_says_that_it_was_cut_short() {
-    let dir = tempfile::tempdir().unwrap();
-    let set = dir.path().join("set");
-    let made = simulate(&set, &["--grasps", "2", "--seed", "7"]);
-    assert!(made.status.success(), "{}", error_text(&made));
+    let (dir, set) = simulated("pattern_36", &["--grasps", "2", "--seed", "7"]);
     let whole = files(&set);
 
     // The same again replaces it; other grasps would mix with it.
@@ -57,9 +55,7 @@ fn a_simulation_never_mixes_with_another_dataset_and_says_that_it_was_cut_short(
     let manifest = set.join(MANIFEST);
     let text = std::fs::read_to_string(&manifest).unwrap();
     assert!(!text.contains("false,\n      \"pairs\""), "{text}");
-    let mut cut: Value = serde_json::from_str(&text).unwrap();
-    cut["parts"]["test"]["finished"] = false.into();
-    std::fs::write(&manifest, cut.to_string()).unwrap();
+    edit_json(&manifest, |cut| cut["parts"]["test"]["finished"] = false.into());
     let set_text = set.to_str().unwrap();
     let doctor = json(&run(&["doctor", set_text, "--no-predictions", "--json"], dir.path())).to_string();
     assert!(doctor.contains("was not finished"), "{doctor}");
@@ -71,9 +67,7 @@ fn a_simulation_never_mixes_with_another_dataset_and_says_that_it_was_cut_short(
 #[cfg(target_os = "linux")]
 #[test]
 fn a_closed_or_full_standard_output_is_no_panic() {
-    let dir = tempfile::tempdir().unwrap();
-    let set = dir.path().join("set");
-    assert!(simulate(&set, &["--grasps", "1"]).status.success());
+    let (dir, set) = simulated("pattern_36", &["--grasps", "1"]);
     let set = set.to_str().unwrap();
     let start = |args: &[&str], out: Stdio| {
         Command::new(env!("CARGO_BIN_EXE_touch2touch"))
@@ -131,9 +125,7 @@ fn a_mistyped_verb_opens_no_window_and_names_the_nearest() {
 
 #[test]
 fn all_damaged_masks_are_listed_and_leftovers_of_killed_exports_go() {
-    let dir = tempfile::tempdir().unwrap();
-    let set = dir.path().join("set");
-    assert!(simulate(&set, &["--grasps", "3"]).status.success());
+    let (dir, set) = simulated("pattern_36", &["--grasps", "3"]);
     let dataset = Dataset::open(&set).unwrap();
     let store = MaskStore::for_dataset(&dataset).unwrap();
     std::fs::create_dir_all(store.folder()).unwrap();
@@ -156,8 +148,7 @@ fn all_damaged_masks_are_listed_and_leftovers_of_killed_exports_go() {
     for entry in &dataset.index.pairs {
         std::fs::remove_file(store.mask_file(&entry.name, lab::LEFT)).unwrap();
     }
-    let done = run(&[&export[..], &["--pairs", "all", "--mask", "truth"]].concat(), dir.path());
-    assert!(done.status.success(), "{}", error_text(&done));
+    succeed(&[&export[..], &["--pairs", "all", "--mask", "truth"]].concat(), dir.path());
     assert!(!left.exists() && out.join("train/imgs").is_dir());
     // The stems say whose they are in the manifest.
     let manifest = std::fs::read(out.join(touch2touch_pipeline::io::exchange::MANIFEST)).unwrap();

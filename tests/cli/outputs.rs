@@ -6,7 +6,7 @@ use serde_json::Value;
 use touch2touch_pipeline::io::dataset::Dataset;
 use touch2touch_pipeline::io::names;
 
-use super::{error_text, json, run, simulate};
+use super::{json, run, simulate, succeed};
 use crate::cli_generate::full_size_bundle;
 
 /// A dataset of the pairs `a/b` and `a__b`, with both halves each.
@@ -51,8 +51,7 @@ fn pairs_that_look_alike_have_files_of_their_own_and_the_report_says_whether_it_
     std::fs::write(&elsewhere, "mine").unwrap();
     #[cfg(unix)]
     std::os::unix::fs::symlink(&elsewhere, &report).unwrap();
-    let done = run(&args, dir.path());
-    assert!(done.status.success(), "{}", error_text(&done));
+    let done = succeed(&args, dir.path());
     assert_eq!(json(&done)["pairs"].as_array().unwrap().len(), 2);
     let stems = ending(&out, "_right.npy");
     assert_eq!(stems, ["a__b", "a/b"].map(names::output));
@@ -84,8 +83,7 @@ fn a_killed_run_is_known_by_its_report_and_its_leftovers_go() {
     };
     let first = args("1");
     let first: Vec<&str> = first.iter().map(String::as_str).collect();
-    let done = run(&first, dir.path());
-    assert!(done.status.success(), "{}", error_text(&done));
+    succeed(&first, dir.path());
     let report = || -> Value { serde_json::from_slice(&std::fs::read(out.join("generate.json")).unwrap()).unwrap() };
     assert_eq!(report()["finished"], true);
     let before = ending(&out, ".npy").len();
@@ -105,7 +103,6 @@ fn a_killed_run_is_known_by_its_report_and_its_leftovers_go() {
     assert_eq!(report()["finished"], false, "the images are newer than the last report");
     // Half a file, as a run killed in the middle of a write leaves it.
     std::fs::write(out.join(".tmp-killed.part"), "half").unwrap();
-    let again = run(&first, dir.path());
-    assert!(again.status.success(), "{}", error_text(&again));
+    succeed(&first, dir.path());
     assert_eq!((&report()["finished"], ending(&out, ".part").len()), (&Value::from(true), 0));
 }

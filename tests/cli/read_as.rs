@@ -9,7 +9,7 @@ use touch2touch_pipeline::io::dataset::Dataset;
 use touch2touch_pipeline::io::simulated::{Layout, write_pair};
 
 use super::{error_text, json};
-use crate::support::{run, shared, simulate};
+use crate::support::{run, shared, simulated};
 
 /// Writes every pair of a data set anew, stored wrongly.
 fn store(set: &Path, mistake: ReadAs) {
@@ -22,10 +22,8 @@ fn store(set: &Path, mistake: ReadAs) {
 
 #[test]
 fn fingers_that_were_swapped_are_said_by_every_verb_and_read_right_for_good() {
-    let dir = tempfile::tempdir().unwrap();
-    let set = dir.path().join("set");
+    let (dir, set) = simulated("pattern_33,pattern_37", &["--grasps", "2", "--seed", "4"]);
     let path = set.to_str().unwrap();
-    simulate(&set, "pattern_33,pattern_37", &["--grasps", "2", "--seed", "4"]);
     let doctor =
         |words: &[&str]| json(&run(&[&["doctor", path, "--no-predictions", "--json"], words].concat(), dir.path()));
     let sound = doctor(&[]);

@@ -3,13 +3,11 @@
 use std::path::Path;
 use std::process::Command;
 
-use super::{error_text, json, run, simulate};
+use super::{error_text, json, run, simulated, succeed};
 
 #[test]
 fn arguments_of_label_that_do_nothing_are_errors() {
-    let dir = tempfile::tempdir().unwrap();
-    let set = dir.path().join("set");
-    simulate(&set, "pattern_36", &["--grasps", "2", "--seed", "7"]);
+    let (dir, set) = simulated("pattern_36", &["--grasps", "2", "--seed", "7"]);
     let label = |args: &[&str]| {
         let all = [&["label", set.to_str().unwrap(), "--pair", "data_0"], args].concat();
         run(&all, dir.path())
@@ -40,13 +38,10 @@ fn arguments_of_label_that_do_nothing_are_errors() {
 #[cfg(unix)]
 #[test]
 fn what_is_no_file_among_labels_and_masks_is_said() {
-    let dir = tempfile::tempdir().unwrap();
-    let set = dir.path().join("set");
-    simulate(&set, "pattern_36", &["--grasps", "2", "--seed", "7"]);
+    let (dir, set) = simulated("pattern_36", &["--grasps", "2", "--seed", "7"]);
     let set = set.to_str().unwrap();
     let pipe = |at: &Path| assert!(Command::new("mkfifo").arg(at).status().unwrap().success());
-    let done = run(&["label", set, "--pair", "data_0", "--adopt", "--review", "done"], dir.path());
-    assert!(done.status.success(), "{}", error_text(&done));
+    succeed(&["label", set, "--pair", "data_0", "--adopt", "--review", "done"], dir.path());
     // A lock that would never be given: it ends, and nothing is stored.
     let masks = Path::new(set).join("touch2touch_masks");
     std::fs::remove_file(masks.join(".lock")).unwrap();
@@ -56,8 +51,7 @@ fn what_is_no_file_among_labels_and_masks_is_said() {
     std::fs::remove_file(masks.join(".lock")).unwrap();
 
     let out = dir.path().join("masks");
-    let export = run(&["masks", "export", set, "--out", out.to_str().unwrap(), "--format", "png"], dir.path());
-    assert!(export.status.success(), "{}", error_text(&export));
+    succeed(&["masks", "export", set, "--out", out.to_str().unwrap(), "--format", "png"], dir.path());
     pipe(&out.join("train/odd_right.png"));
     let found = run(&["masks", "import", set, "--from", out.to_str().unwrap(), "--json"], dir.path());
     let report = json(&found);

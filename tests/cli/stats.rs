@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::{error_text, json, run};
+use super::{error_text, json, run, succeed};
 
 /// The demo with two steps on the built-in engine.
 const QUICK: [&str; 4] = ["--steps", "2", "--runtime", "rten"];
@@ -13,9 +13,7 @@ fn statistics_are_written_once_and_serve_their_bundle_only() {
     let file = dir.path().join("stats.json");
     let path = file.to_str().unwrap();
     let stats = ["stats", "demo", "--limit", "3", "--out", path, "--json"];
-    let done = run(&[&stats[..], &QUICK].concat(), dir.path());
-    assert!(done.status.success(), "{}", error_text(&done));
-    let report = json(&done);
+    let report = json(&succeed(&[&stats[..], &QUICK].concat(), dir.path()));
     assert_eq!(report["touches"], 6, "both fingers");
     for key in ["bundle_hash", "dataset", "seed", "steps", "sampler", "made", "predicted_pixels"] {
         assert!(!report[key].is_null(), "{key}: {report}");
@@ -26,8 +24,7 @@ fn statistics_are_written_once_and_serve_their_bundle_only() {
     let out = dir.path().join("out");
     let generate = ["generate", "demo", "--limit", "1", "--out", out.to_str().unwrap(), "--json"];
     let refit = ["--shift", &format!("refit:{path}")];
-    let done = run(&[&generate[..], &QUICK, &refit].concat(), dir.path());
-    assert!(done.status.success(), "{}", error_text(&done));
+    let done = succeed(&[&generate[..], &QUICK, &refit].concat(), dir.path());
     assert!(json(&done)["pairs"][0]["psnr_db"].is_number());
 
     // Another bundle's statistics are refused, and both are named.

@@ -4,8 +4,7 @@ use std::path::Path;
 
 use touch2touch_pipeline::io::stl;
 
-use super::{error_text, json};
-use crate::support::{run, simulate};
+use super::{error_text, json, run, simulated};
 
 /// Makes a CAD model larger, as if it were in a smaller unit.
 fn scale(file: &Path, by: f64) {
@@ -16,10 +15,8 @@ fn scale(file: &Path, by: f64) {
 
 #[test]
 fn a_model_in_millimeters_is_said_and_accepted_for_good() {
-    let dir = tempfile::tempdir().unwrap();
-    let set = dir.path().join("set");
+    let (dir, set) = simulated("pattern_36,pattern_31_rod", &["--grasps", "1"]);
     let path = set.to_str().unwrap();
-    simulate(&set, "pattern_36,pattern_31_rod", &["--grasps", "1"]);
     let folder = set.join("tools_stls");
     let [own, other] = ["pattern_36", "pattern_31_rod"];
     let said = || std::fs::read_to_string(folder.join("unit.txt")).ok();

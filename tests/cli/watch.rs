@@ -9,24 +9,15 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 use touch2touch_pipeline::io::npz;
 
-use super::{error_text, run, simulate};
+use super::{error_text, run, simulate, succeed};
+use crate::support::files_below;
 
 /// Two simulated grasps in the lab's layout; returns the folder of the set and its two GelSlim files.
 fn set(dir: &Path) -> (PathBuf, Vec<PathBuf>) {
     let set = dir.join("set");
     simulate(&set, "pattern_36", &["--grasps", "3", "--seed", "5"]);
-    let mut files = Vec::new();
-    let mut folders = vec![set.clone()];
-    while let Some(folder) = folders.pop() {
-        for entry in std::fs::read_dir(folder).unwrap() {
-            let path = entry.unwrap().path();
-            if path.is_dir() {
-                folders.push(path);
-            } else if path.to_str().unwrap().contains("gelslims") {
-                files.push(path);
-            }
-        }
-    }
+    let mut files = files_below(&set);
+    files.retain(|path| path.to_str().unwrap().contains("gelslims"));
     files.sort();
     assert_eq!(files.len(), 3);
     (set, files)
@@ -190,8 +181,7 @@ fn without_tool_or_camera_it_says_so_and_existing_files_are_taken_once() {
     let out = dir.path().join("out");
     let args = ["watch", folder.to_str().unwrap(), "--once", "--steps", "1", "--out", out.to_str().unwrap()];
     let start = Instant::now();
-    let done = run(&args, dir.path());
-    assert!(done.status.success(), "{}", error_text(&done));
+    let done = succeed(&args, dir.path());
     let text = String::from_utf8_lossy(&done.stdout).into_owned();
     assert!(text.contains("2 done, 0 skipped, 0 failed"), "{text}");
     let read = |name: &str| -> Value { serde_json::from_slice(&std::fs::read(out.join(name)).unwrap()).unwrap() };

@@ -20,6 +20,8 @@ use touch2touch_pipeline::io::masks::{MaskStore, StoredMask, StoredReview};
 use touch2touch_pipeline::io::statistics::{Provenance, ShiftStatistics};
 use touch2touch_pipeline::io::{images, npz, pt, stl};
 
+use crate::support::tetrahedron;
+
 use super::seeds::{self, Content, Seed, bad, good, text, written};
 
 /// A reader.
@@ -182,16 +184,8 @@ fn read_pair(dir: &Path, file: &Path) -> Outcome {
     Ok(())
 }
 
-fn tetrahedron() -> touch2touch_core::mesh::TriMesh {
-    let corners = [[0.0, 0.0, 0.0], [0.04, 0.0, 0.0], [0.0, 0.04, 0.0], [0.0, 0.0, 0.04]];
-    touch2touch_core::mesh::TriMesh {
-        vertices: corners.map(glam::DVec3::from_array).to_vec(),
-        triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
-    }
-}
-
 fn stl_seeds() -> Vec<Seed> {
-    let binary = written(|file| stl::write(file, &tetrahedron()).unwrap());
+    let binary = written(|file| stl::write(file, &tetrahedron(0.04)).unwrap());
     let mut lying = binary.clone();
     lying[80..84].copy_from_slice(&u32::MAX.to_le_bytes());
     let facet = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1e-2 0 0\nvertex 0 1e-2 0\nendloop\nendfacet\n";
@@ -212,7 +206,7 @@ fn unit_seeds() -> Vec<Seed> {
 }
 
 fn place_unit(dir: &Path, bytes: &[u8]) -> PathBuf {
-    stl::write(&dir.join("a.stl"), &tetrahedron()).unwrap();
+    stl::write(&dir.join("a.stl"), &tetrahedron(0.04)).unwrap();
     put(dir.join(UNIT_FILE), bytes)
 }
 

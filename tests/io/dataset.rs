@@ -3,15 +3,20 @@
 use std::path::Path;
 
 use crate::support;
+use glam::DVec3;
+use touch2touch_core::catalog;
 use touch2touch_core::dataset::{PairId, Split};
+use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::Grid;
-use touch2touch_core::rig::lab;
+use touch2touch_core::mesh::TriMesh;
+use touch2touch_core::rig::{CameraTolerance, lab};
+use touch2touch_core::sample::Sample;
 use touch2touch_core::turn::Turn;
 use touch2touch_pipeline::io::dataset::{Dataset, SourceKind};
 use touch2touch_pipeline::io::error::FileErrorKind;
 use touch2touch_pipeline::io::images;
 use touch2touch_pipeline::io::pt::{PtItem, Tensor, read_dict, write_dict};
-use touch2touch_pipeline::io::simulated::{Layout, pair_paths, write_pair};
+use touch2touch_pipeline::io::simulated::{Layout, pair_paths, write_pair, write_tools};
 
 use super::pt::with_pickle;
 use super::{touch, touch_file};
@@ -218,6 +223,32 @@ fn a_number_of_numpy_costs_the_true_pose_alone_and_three_digits_are_said() {
     assert!(sample.notes[0].what.contains("stored as bfloat16"), "{:?}", sample.notes);
 }
 
+#[test]
+fn a_lab_folder_says_its_tolerance_its_axes_and_where_its_poses_lie() {
+    let dir = tempfile::tempdir().unwrap();
+    let write = |index, theta_rad| {
+        let grasp_from_object = Some(PlanarPose { theta_rad, ..PlanarPose::default() });
+        let touch = Sample { grasp_from_object, ..touch(0.0) };
+        write_pair(dir.path(), Layout::Train, "pattern_31_rod", index, &touch).unwrap();
+    };
+    (0..12).for_each(|index| write(index, 0.05 * index as f64 - 0.3));
+    let rod = catalog::tools().iter().find(|tool| tool.name == "pattern_31_rod").unwrap().mesh();
+    write_tools(dir.path(), &[("pattern_31_rod", true, rod.clone())]).unwrap();
+    std::fs::write(dir.path().join("rig.json"), r#"{"camera_tolerance": {"angle_deg": 3, "place_mm": 1}}"#).unwrap();
+    std::fs::write(dir.path().join("read-as.txt"), "cad-axes=yzx").unwrap();
+    let dataset = Dataset::open(dir.path()).unwrap();
+    let sample = dataset.load(PairId(3)).unwrap();
+    assert_eq!(sample.rig.camera_tolerance, CameraTolerance { angle_deg: 3.0, place_mm: 1.0 });
+    assert!(sample.in_lab_grid && sample.notes.is_empty(), "{:?}", sample.notes);
+    let size = |mesh: &TriMesh| mesh.bounds().map(|[lo, hi]| hi - lo).unwrap();
+    let (read, own) = (size(&dataset.tool_mesh("pattern_31_rod").unwrap().unwrap()), size(&rod));
+    assert!(read.abs_diff_eq(DVec3::new(own.y, own.z, own.x), 1e-6), "{read} of {own}");
+    write(11, 1.0);
+    assert!(!Dataset::open(dir.path()).unwrap().load(PairId(3)).unwrap().in_lab_grid);
+    std::fs::write(dir.path().join("rig.json"), r#"{"camera_tolerance": {"angle_deg": -3, "place_mm": 1}}"#).unwrap();
+    assert!(Dataset::open(dir.path()).unwrap_err().to_string().contains("angle_deg must be 0 to 20"));
+}
+
 /// Where names in other letters are other files.
 #[cfg(target_os = "linux")]
 #[test]
@@ -354,7 +385,6 @@ fn pytorch_reads_a_written_pair() {
     let dir = tempfile::tempdir().unwrap();
     let [gelslim, bubble] = write_pair(dir.path(), Layout::Train, "pattern_32", 0, &touch(0.0)).unwrap();
     assert!(read_dict(&bubble).unwrap().keys().contains(&"contact_mask".to_string()));
-    let Some(python) = support::torch() else { return };
     let script = "
 import sys, torch
 g, b = (torch.load(p, weights_only=True) for p in sys.argv[1:])
@@ -369,11 +399,5 @@ for k in ('gelslim', 'gelslim_ref'): assert g[k].shape == (2,3,320,427) and g[k]
 assert abs(b['theta'].item() - 0.1) < 1e-12 and abs(b['x'].item() - 0.002) < 1e-12 and abs(b['y'].item() + 0.003) < 1e-12
 assert g['gelslim'][1,0,0,0] == 101 and g['gelslim'][0,1,5,7] == 107
 ";
-    let out = std::process::Command::new(python)
-        .args(["-c", script])
-        .args([gelslim, bubble])
-        .env("OMP_NUM_THREADS", "1")
-        .output()
-        .unwrap();
-    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    support::torch_runs(script, &[gelslim, bubble]);
 }

@@ -6,7 +6,6 @@ use std::path::Path;
 use touch2touch_core::catalog;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::grid::Grid;
-use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::resample;
 use touch2touch_core::rig::lab;
 use touch2touch_core::sample::Sample;
@@ -17,15 +16,7 @@ use touch2touch_pipeline::io::images;
 use touch2touch_pipeline::io::simulated::{Layout, write_pair, write_tools};
 
 use super::touch;
-use crate::support;
-
-fn tetrahedron(size: f64) -> TriMesh {
-    let corners = [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [0., 0., 1.]];
-    TriMesh {
-        vertices: corners.iter().map(|&c| glam::DVec3::from_array(c) * size).collect(),
-        triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
-    }
-}
+use crate::support::{self, tetrahedron};
 
 fn doctor(root: &Path) -> DoctorReport {
     examine(&Dataset::open(root).unwrap(), MOST_PAIRS, &mut |_, _| ControlFlow::Continue(()))

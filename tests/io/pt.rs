@@ -198,7 +198,6 @@ fn what_is_written_reads_back_and_is_the_same_every_time() {
 /// Needs a Python with PyTorch, named by `TOUCH2TOUCH_TORCH_PYTHON`.
 #[test]
 fn pytorch_reads_what_is_written() {
-    let Some(python) = support::torch() else { return };
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("own.pt");
     write_dict(&path, &sample_items()).unwrap();
@@ -216,11 +215,5 @@ assert d['none'].shape == (0, 3)
 assert d['train_tools'] == ['pattern_31_rod', 'ünïcode'] and d['name'] == 'demo' and d['scale'] == 0.1
 torch.load(sys.argv[1], weights_only=True, mmap=True)
 ";
-    let out = std::process::Command::new(python)
-        .args(["-c", script])
-        .arg(&path)
-        .env("OMP_NUM_THREADS", "1")
-        .output()
-        .unwrap();
-    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    support::torch_runs(script, &[path]);
 }

@@ -13,7 +13,7 @@ use touch2touch_pipeline::compare::subject::Subject;
 use super::rig::Rig;
 
 /// The pixels of a part of the screen.
-fn pixels(rig: &mut Rig, rect: Rect) -> Vec<[u8; 4]> {
+pub(super) fn pixels(rig: &mut Rig, rect: Rect) -> Vec<[u8; 4]> {
     let image = rig.harness.render().unwrap();
     let inside = |x: u32, y: u32| rect.contains(Pos2::new(x as f32, y as f32));
     image.enumerate_pixels().filter(|(x, y, _)| inside(*x, *y)).map(|(_, _, p)| p.0).collect()

@@ -17,13 +17,7 @@ impl Rig {
     fn click_in(&mut self, label: &str, share: [f32; 2]) {
         let rect = self.harness.get_by_label(label).rect();
         let at = rect.min + vec2(share[0], share[1]) * rect.size();
-        self.harness.hover_at(at);
-        self.harness.step();
-        self.harness.drag_at(at);
-        self.harness.step();
-        self.harness.drop_at(at);
-        self.harness.step();
-        self.settle();
+        self.click_at(at);
     }
 
     fn at(&self) -> [usize; 2] {

@@ -17,6 +17,7 @@ use touch2touch_pipeline::io::dataset::Dataset;
 use touch2touch_pipeline::io::masks::MaskStore;
 
 use super::rig::Rig;
+use crate::support::files_below;
 
 const SIZE: [f32; 2] = [1280.0, 800.0];
 
@@ -45,15 +46,8 @@ impl Rig {
     }
 }
 
-fn files(folder: &Path, out: &mut BTreeMap<PathBuf, u64>) {
-    for entry in std::fs::read_dir(folder).unwrap().flatten() {
-        let path = entry.path();
-        if path.is_dir() {
-            files(&path, out);
-        } else {
-            out.insert(path, entry.metadata().unwrap().len());
-        }
-    }
+fn files(folder: &Path) -> BTreeMap<PathBuf, u64> {
+    files_below(folder).into_iter().map(|path| (path.clone(), path.metadata().unwrap().len())).collect()
 }
 
 #[test]
@@ -150,17 +144,14 @@ fn at_rest_nothing_is_drawn_uploaded_or_written() {
     rig.send(TasksCommand::LogSeen(u64::MAX));
     rig.settle();
     let uploads = rig.harness.state().uploads();
-    let mut before = BTreeMap::new();
-    files(&rig.data, &mut before);
+    let before = files(&rig.data);
     for _ in 0..5 {
         rig.harness.step();
         let delays: Vec<_> = rig.harness.output().viewport_output.values().map(|v| v.repaint_delay).collect();
         assert!(delays.iter().all(|d| *d > std::time::Duration::from_secs(3600)), "a repaint is asked for: {delays:?}");
     }
     assert_eq!(rig.harness.state().uploads(), uploads);
-    let mut after = BTreeMap::new();
-    files(&rig.data, &mut after);
-    assert_eq!(before, after);
+    assert_eq!(before, files(&rig.data));
 }
 
 #[test]

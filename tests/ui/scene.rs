@@ -1,6 +1,5 @@
 //! The 3D views: distances, what is drawn, cameras.
 
-use eframe::egui::Pos2;
 use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::command::WorkbenchCommand;
 use touch2touch::app::keys::ImprintSource;
@@ -9,6 +8,7 @@ use touch2touch::app::settings::SceneLayer;
 use touch2touch::app::workbench::Layer;
 use touch2touch_core::rig::lab;
 
+use super::compare::pixels;
 use super::rig::Rig;
 
 const MEASURED: ImprintSource = ImprintSource::Measured;
@@ -16,9 +16,7 @@ const MEASURED: ImprintSource = ImprintSource::Measured;
 /// Colors of the measured view, as a set.
 fn colors(rig: &mut Rig) -> std::collections::BTreeSet<[u8; 4]> {
     let rect = rig.harness.get_by_label("3D view, measured").rect();
-    let image = rig.harness.render().unwrap();
-    let inside = |x: u32, y: u32| rect.contains(Pos2::new(x as f32, y as f32));
-    image.enumerate_pixels().filter(|(x, y, _)| inside(*x, *y)).map(|(_, _, p)| p.0).collect()
+    pixels(rig, rect).into_iter().collect()
 }
 
 #[test]

@@ -205,11 +205,8 @@ pub fn settled_model(imprint: &DepthMap, mask: Mask) -> ContactMask {
 mod tests {
     use super::*;
     use crate::align::testing::cuboid;
+    use crate::fixture::count;
     use glam::DVec3;
-
-    fn count(mask: &Mask) -> usize {
-        mask.as_slice().iter().filter(|&&m| m).count()
-    }
 
     #[test]
     fn threshold_and_top_percent_ignore_what_is_not_finite() {

@@ -2,7 +2,7 @@
 
 use glam::{DAffine3, DMat3, DMat4, DVec3, DVec4};
 
-use crate::grid::DepthMap;
+use crate::grid::{DepthMap, Mask};
 use crate::label::{Layers, Sight};
 use crate::rig::lab;
 use crate::sample::DepthCamera;
@@ -34,6 +34,11 @@ pub(crate) fn from_above(scale: f64, layers: Layers) -> Sight {
         DVec4::new(0.0, 0.0, 0.01, eye),
     );
     Sight { clip_from_grasp: clip.as_mat4(), size_px: [400, 300], layers }
+}
+
+/// Pixels that are set.
+pub(crate) fn count(mask: &Mask) -> usize {
+    mask.as_slice().iter().filter(|&&v| v).count()
 }
 
 /// A sheet of 21 x 21 points half a millimeter apart around the axis, at a height.

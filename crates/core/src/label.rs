@@ -114,13 +114,10 @@ pub fn paint(mask: &mut Mask, [a, b]: [DVec2; 2], radius_px: f64, value: bool) -
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fixture::count;
 
     fn empty() -> Mask {
         Mask::filled(40, 30, false)
-    }
-
-    fn count(mask: &Mask) -> usize {
-        mask.as_slice().iter().filter(|&&v| v).count()
     }
 
     #[test]

@@ -156,14 +156,9 @@ impl Clipping {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fixture::unvaried;
-    use crate::random::Purpose;
+    use crate::fixture::{random, unvaried};
 
     const SIDE: usize = 16;
-
-    fn random(seed: u64) -> Random {
-        Random::new(seed, Purpose::Variation, 0, 0)
-    }
 
     fn pair() -> (Vec<f32>, Vec<f32>) {
         let mut random = random(9);

@@ -7,7 +7,11 @@ use crate::nets::Layout;
 use crate::nets::generator::Sizes;
 use crate::pair::Pair;
 use crate::random::{Purpose, Random};
+use crate::trainer::Descent;
 use crate::tuner::{NoiseSchedule, Placement, Sampler, Start};
+
+/// The generator that the program comes with.
+pub(crate) const BUNDLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/models/generator_ldm");
 
 pub(crate) fn random(seed: u64) -> Random {
     Random::new(seed, Purpose::Variation, 0, 0)
@@ -25,6 +29,11 @@ pub(crate) fn sizes() -> Sizes {
         mean: vec![1, 4, 1, 1],
         deviation: vec![1, 4, 1, 1],
     }
+}
+
+/// A graph of the generator that the program comes with.
+pub(crate) fn shipped(name: &str) -> Vec<u8> {
+    std::fs::read(format!("{BUNDLE}/{name}.onnx")).unwrap()
 }
 
 /// A protobuf field that holds bytes.
@@ -84,6 +93,15 @@ pub(crate) fn start() -> Start {
         unit_m: [-0.006, 0.018],
         placement: identity(2, sizes.side),
     }
+}
+
+/// A run to its end, and its losses.
+pub(crate) fn run<T: Descent>(mut tuner: T) -> (T, Vec<f32>) {
+    let mut losses = Vec::new();
+    while tuner.steps_done() < tuner.steps() {
+        losses.push(tuner.step().unwrap().loss);
+    }
+    (tuner, losses)
 }
 
 /// Everything as the decoder draws it.

@@ -13,11 +13,6 @@ use crate::training::{bytes, corrected};
 /// Times, places and what else no two runs share.
 const OWN: [&str; 5] = ["seconds", "fit_seconds", "peak_mib", "bundle", "curves"];
 
-fn without(value: Value, keys: &[&str]) -> Value {
-    let Value::Object(map) = value else { panic!("{value}") };
-    map.into_iter().filter(|(key, _)| !keys.contains(&key.as_str())).collect()
-}
-
 #[test]
 pub(in crate::agreement) fn a_fit_is_the_same_by_button_and_verb() {
     let home = tempfile::tempdir().unwrap();

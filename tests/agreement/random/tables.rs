@@ -7,13 +7,6 @@ use touch2touch_pipeline::steps::recipe::Stage;
 
 use super::*;
 
-/// A value without what no two runs share.
-fn without(mut value: Value, keys: &[&str]) -> Value {
-    let map = value.as_object_mut().unwrap();
-    keys.iter().for_each(|key| drop(map.remove(*key)));
-    value
-}
-
 /// The only file below a folder.
 fn only_file(folder: &Path) -> Value {
     let files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();

@@ -12,6 +12,7 @@ use touch2touch_pipeline::steps::mask::MaskSource;
 use touch2touch_pipeline::steps::recipe::Stage;
 
 use super::*;
+use crate::support::{files_below, succeed};
 use touch2touch::app::{recipe, results};
 
 /// Holds the pair on screen against the files that the verb wrote of it.
@@ -61,21 +62,19 @@ fn same_touch(both: &Both, written_by: &Path, what: &str) -> usize {
     count
 }
 
-/// The results of the verb in a folder, by the name of the touch that they say.
-fn results(folder: &Path) -> Vec<(String, PathBuf)> {
-    let mut found = Vec::new();
-    let mut folders = vec![folder.to_owned()];
-    while let Some(folder) = folders.pop() {
-        for entry in std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
-            if entry.is_dir() {
-                folders.push(entry);
-            } else if entry.to_string_lossy().ends_with(".t2t.json") {
-                let said: Value = serde_json::from_slice(&std::fs::read(&entry).unwrap()).unwrap();
-                found.push((said["name"].as_str().unwrap().to_owned(), entry));
-            }
-        }
-    }
-    found
+/// The results of the verb with the recipe in force, by the name of the touch that they say.
+fn watched(both: &Both) -> Vec<(String, PathBuf)> {
+    let out = both.at("watched");
+    let begin = ["watch", &both.path, "--once", "--out", &out].map(str::to_owned);
+    let words = recipe::in_force(&both.studio.state, ImprintSource::Predicted).words(Stage::Pose).list();
+    let all: Vec<&str> = begin.iter().chain(&words).map(String::as_str).chain(["--json"]).collect();
+    succeed(&all, &both.home);
+    let written = files_below(Path::new(&out)).into_iter().filter(|file| file.to_string_lossy().ends_with(".t2t.json"));
+    let named = written.map(|file| {
+        let said: Value = serde_json::from_slice(&std::fs::read(&file).unwrap()).unwrap();
+        (said["name"].as_str().unwrap().to_owned(), file)
+    });
+    named.collect()
 }
 
 #[test]
@@ -93,13 +92,7 @@ pub(in crate::agreement) fn what_lies_in_a_folder_is_watched_to_the_numbers_that
             }
         };
         put(&mut both.studio, &recipe);
-        let out = both.at("watched");
-        let begin = ["watch", &both.path, "--once", "--out", &out].map(str::to_owned);
-        let words = recipe::in_force(&both.studio.state, ImprintSource::Predicted).words(Stage::Pose).list();
-        let all: Vec<&str> = begin.iter().chain(&words).map(String::as_str).chain(["--json"]).collect();
-        let lines = run(&all, &both.home);
-        assert!(lines.status.success(), "{recipe:?}: {}", String::from_utf8_lossy(&lines.stderr));
-        let found = results(Path::new(&out));
+        let found = watched(&both);
         assert_eq!(found.len() as u32, both.pairs(), "{found:?}");
         let mut count = 0;
         for (name, file) in found {
@@ -137,13 +130,7 @@ pub(in crate::agreement) fn what_arrives_is_followed_by_the_studio_to_the_number
     // Until it is predicted and posed.
     both.studio.send(ViewCommand::ShowBothFingers(true).into());
     assert!(both.studio.state.pair_name().ends_with("data_40"), "{}", both.studio.state.pair_name());
-    let out = both.at("watched");
-    let begin = ["watch", &both.path, "--once", "--out", &out].map(str::to_owned);
-    let words = recipe::in_force(&both.studio.state, ImprintSource::Predicted).words(Stage::Pose).list();
-    let all: Vec<&str> = begin.iter().chain(&words).map(String::as_str).chain(["--json"]).collect();
-    let lines = run(&all, &both.home);
-    assert!(lines.status.success(), "{recipe:?}: {}", String::from_utf8_lossy(&lines.stderr));
-    let found = results(Path::new(&out));
+    let found = watched(&both);
     let (_, file) = found.iter().find(|(name, _)| name == both.studio.state.pair_name()).expect("it was watched");
     compared(&[same_touch(&both, file, &format!("{recipe:?}"))], 20_000);
 }

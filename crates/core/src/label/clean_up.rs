@@ -138,12 +138,8 @@ fn smooth(mask: &Mask, radius_px: f64) -> Mask {
 
 #[cfg(test)]
 mod tests {
-
     use super::*;
-
-    fn count(mask: &Mask) -> usize {
-        mask.as_slice().iter().filter(|&&v| v).count()
-    }
+    use crate::fixture::count;
 
     fn clean(kind: CleanKind, size_mm: f64, mask: &Mask) -> Mask {
         CleanUp { kind, size_mm }.apply(mask, 2.0)

@@ -261,7 +261,7 @@ mod tests {
     use super::super::provenance::Provenance;
     use super::super::sight::Layers;
     use super::*;
-    use crate::fixture::{from_above, sheet};
+    use crate::fixture::{count, from_above, sheet};
 
     fn imprint() -> DepthMap {
         // Two plateaus joined by a ramp, and a far one of the first's depth.
@@ -285,10 +285,6 @@ mod tests {
         let kept = |i: usize| hand.as_slice()[i] || mask.as_slice()[i] == before.as_slice()[i];
         assert!((0..mask.len()).all(kept), "what was not painted stays");
         Some(rect)
-    }
-
-    fn count(mask: &Mask) -> usize {
-        mask.as_slice().iter().filter(|&&v| v).count()
     }
 
     #[test]

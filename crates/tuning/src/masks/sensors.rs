@@ -166,13 +166,9 @@ fn boxed(picture: &[f32], [width, height]: [usize; 2]) -> Vec<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::Purpose;
+    use crate::fixture::random;
 
     const SIZE: [usize; 2] = [9, 6];
-
-    fn random(seed: u64) -> Random {
-        Random::new(seed, Purpose::Variation, 0, 0)
-    }
 
     /// No variation at all.
     fn unvaried() -> Sensors {

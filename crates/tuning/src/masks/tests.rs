@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::Descent as _;
-use crate::fixture;
+use crate::fixture::{self, run};
 use crate::nets::mask::layout;
 
 const SIZE: [usize; 2] = [22, 18];
@@ -30,14 +30,6 @@ fn touches(count: usize) -> Vec<MaskTouch> {
 fn config() -> MaskConfig {
     let sensors = Sensors { shift_px: 2, ..Sensors::default() };
     MaskConfig { steps: 160, batch: 4, rate: 1e-2, threads: Some(2), sensors, ..MaskConfig::default() }
-}
-
-fn run(mut tuner: MaskTuner) -> (MaskTuner, Vec<f32>) {
-    let mut losses = Vec::new();
-    while tuner.steps_done() < tuner.steps() {
-        losses.push(tuner.step().unwrap().loss);
-    }
-    (tuner, losses)
 }
 
 fn iou(tuner: &MaskTuner, of_start: bool) -> f64 {

@@ -1,12 +1,7 @@
 use super::*;
-use crate::fixture::{field, initializer};
+use crate::fixture::{field, initializer, shipped};
 
-const BUNDLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/models/generator_ldm");
-const FILES: [&str; 3] = ["condition_encoder.onnx", "denoiser.onnx", "decoder.onnx"];
-
-fn shipped(name: &str) -> Vec<u8> {
-    std::fs::read(format!("{BUNDLE}/{name}")).unwrap()
-}
+const FILES: [&str; 3] = ["condition_encoder", "denoiser", "decoder"];
 
 #[test]
 fn the_shipped_files_have_a_name_for_each_weight() {
@@ -14,7 +9,7 @@ fn the_shipped_files_have_a_name_for_each_weight() {
         let file = Onnx::parse(shipped(name)).unwrap();
         assert!(file.weights().iter().all(|w| !w.name().contains("onnx::") && !w.name().contains('/')), "{name}");
     }
-    let encoder = Onnx::parse(shipped("condition_encoder.onnx")).unwrap();
+    let encoder = Onnx::parse(shipped("condition_encoder")).unwrap();
     let weight = |name: &str| encoder.weights().iter().find(|w| w.name() == name).unwrap();
     assert_eq!(weight("mix.0.mlp.2.weight").shape(), [320, 160]);
     assert_eq!(weight("trunk.6.bias").shape(), [160, 1, 1]);
@@ -34,7 +29,7 @@ fn writing_what_was_read_changes_no_byte() {
 
 #[test]
 fn written_weights_are_read_back_and_nothing_else_changes() {
-    let bytes = shipped("decoder.onnx");
+    let bytes = shipped("decoder");
     let file = Onnx::parse(bytes.clone()).unwrap();
     let changed = "decoder.5.conv1.weight";
     let of = |file: &Onnx, name: &str| file.values(file.weights().iter().find(|w| w.name() == name).unwrap());

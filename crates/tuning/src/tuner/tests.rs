@@ -1,7 +1,7 @@
 use super::*;
 use crate::Descent as _;
 use crate::augment::Augment;
-use crate::fixture;
+use crate::fixture::{self, run};
 use crate::image;
 
 /// A run lives on a thread of its own.
@@ -12,14 +12,6 @@ const _: () = {
 
 fn tuner(config: Config) -> Tuner {
     Tuner::new(&fixture::start(), fixture::pairs(6), config, None).unwrap()
-}
-
-fn run(mut tuner: Tuner) -> (Tuner, Vec<f32>) {
-    let mut losses = Vec::new();
-    while tuner.steps_done() < tuner.steps() {
-        losses.push(tuner.step().unwrap().loss);
-    }
-    (tuner, losses)
 }
 
 #[test]

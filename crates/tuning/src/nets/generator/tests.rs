@@ -3,14 +3,8 @@ use std::sync::Arc;
 use rten::{Model, Value, ValueOrView, ValueView};
 
 use super::*;
-use crate::fixture;
+use crate::fixture::{self, BUNDLE, shipped};
 use crate::tape::backward;
-
-const BUNDLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/models/generator_ldm");
-
-fn shipped(name: &str) -> Vec<u8> {
-    std::fs::read(format!("{BUNDLE}/{name}.onnx")).unwrap()
-}
 
 /// Output that rten computes with the shipped graph.
 fn run(name: &str, inputs: &[(&str, &[usize], &[f32])], timestep: Option<i32>, output: &str) -> Vec<f32> {
