@@ -130,6 +130,8 @@ fn cancel(state: &State) -> Option<Command> {
         does(LabelsCommand::CancelStroke)
     } else if state.export.importing.is_some() {
         does(ExportCommand::AskImport(None))
+    } else if state.export.still.is_some() {
+        does(ExportCommand::AskStill(None))
     } else if state.export.asking_masks {
         does(ExportCommand::AskMasks(false))
     } else if results::proposes(state) {

@@ -1,11 +1,13 @@
 //! The room of what is taken away: pictures in 3D, pairs for other programs, masks.
 
 mod command;
+mod still;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 pub use command::{equivalent, equivalent_words};
+pub(crate) use still::{still_key, still_setup};
 
 use super::effect::{Access, Effect};
 use super::jobs::Worker;
@@ -16,7 +18,6 @@ use super::state::State;
 pub use super::state::export::{Output, StillAsked};
 use super::state::tasks::{Level, TaskKind};
 use super::state::view::{Purpose, UiRequest};
-use super::state::workbench::Layer;
 use super::tasks::{self, Start};
 use crate::spatial;
 use touch2touch_core::frames::PlanarPose;
@@ -30,7 +31,7 @@ use touch2touch_pipeline::labels::Labels;
 use touch2touch_pipeline::steps::estimate::Estimate;
 use touch2touch_pipeline::steps::prediction::predicted_by;
 use touch2touch_pipeline::steps::tool::LoadedTool;
-use touch2touch_pipeline::still::{StillSetup, still};
+use touch2touch_pipeline::still::still;
 
 /// A command to what is taken away.
 #[derive(Clone, Debug)]
@@ -41,6 +42,8 @@ pub enum ExportCommand {
     SetMasks(ExportChoice),
     /// Says what an import of masks from a folder or file would change; `None` asks no more.
     AskImport(Option<PathBuf>),
+    /// Opens, changes or closes the form of a 3D picture.
+    AskStill(Option<StillAsked>),
     /// True where it replaces what was painted by hand as well.
     ImportOverHand(bool),
     /// Does it.
@@ -60,9 +63,14 @@ pub(super) fn step(state: &mut State, command: ExportCommand, effects: &mut Vec<
         ExportCommand::SetMasks(choice) => state.export.masks = choice,
         ExportCommand::AskImport(from) => {
             state.close_dialogs();
-            state.export.imports += 1;
-            let asked = state.export.imports;
+            state.export.asked += 1;
+            let asked = state.export.asked;
             state.export.importing = from.map(|from| ImportForm { from, over_drawn: false, asked });
+        }
+        ExportCommand::AskStill(asked) => {
+            state.close_dialogs();
+            state.export.asked += 1;
+            state.export.still = asked.map(|asked| (asked, state.export.asked));
         }
         ExportCommand::ImportOverHand(over_drawn) => {
             if let Some(form) = &mut state.export.importing {
@@ -117,6 +125,7 @@ fn write(state: &mut State, output: Output, file: PathBuf, effects: &mut Vec<Eff
             });
         }
         Output::Still(asked) => {
+            state.export.still = None;
             let Some((setup, open)) = still_setup(state, asked).zip(state.library.open.as_ref()) else { return };
             let source = open.source.clone();
             let png = asked.turntable.is_none() && file.extension().is_none();
@@ -167,22 +176,6 @@ impl PairExport {
         };
         pair_files::write(&parts, folder)
     }
-}
-
-/// A picture of the selected pair in 3D, by the recipe of what is shown, in the colors of distances where these are on.
-pub(crate) fn still_setup(state: &State, asked: StillAsked) -> Option<StillSetup> {
-    let reach = state.settings.scene.distance_m;
-    Some(StillSetup {
-        pair: state.selection.pair?,
-        pane: asked.pane,
-        recipe: command::recipe_shown(state, *asked.pane.sides().last()?),
-        labels: state.document.pair(state.pair_name()).cloned().unwrap_or_default(),
-        ground: asked.ground,
-        angles: asked.angles,
-        width_px: asked.width_px,
-        turntable: asked.turntable,
-        distance_m: (state.workbench.layer == Layer::Distance).then_some(reach.into()),
-    })
 }
 
 /// The export of the selected pair; `None` while its cloud is not there.

@@ -54,6 +54,8 @@ named! {
     LayersKey(EstimateKey);
     /// The distances of the contact points from the model at a registered pose.
     DeviationKey(EstimateKey);
+    /// The preview of a 3D picture, by the number of the asking.
+    StillKey(EstimateKey, u64);
     /// The tools of the data set, ranked for the touch that a pose is of.
     RankingKey(EstimateKey);
 }

@@ -136,7 +136,8 @@ impl State {
 
     /// Closes the dialogs that stand beside the work: there is one at a time.
     pub(super) fn close_dialogs(&mut self) {
-        (self.export.asking_masks, self.export.importing, self.doctor.shown) = (false, None, false);
+        (self.export.asking_masks, self.export.importing, self.export.still) = (false, None, None);
+        self.doctor.shown = false;
     }
 
     /// True where a 3D view of a side is on screen.

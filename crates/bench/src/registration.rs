@@ -67,6 +67,9 @@ pub(super) struct RegistrationArgs {
     no_peers: bool,
 }
 
+/// All cases are from the lab's grid, as a folder of its grasps would say.
+pub(super) const OF_CASES: Ask<'static> = Ask { starts: None, record: false, evidence: false, in_lab_grid: true };
+
 /// Which contact masks. As text `spoilt`, `clean`, `unet` or `threshold=MM`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(into = "String")]
@@ -393,9 +396,9 @@ fn measure(
             let images = images(whole);
             let contacts = Contacts { points: &case.points, images: &images };
             // First, so that what is made once for a tool is not charged to its first case.
-            let judged = register_with(&*method, contacts, model, Ask { evidence: true, ..Ask::default() });
+            let judged = register_with(&*method, contacts, model, Ask { evidence: true, ..OF_CASES });
             let before = thread_cpu_ms();
-            let result = timed(|| register(contacts, model, engine, false));
+            let result = timed(|| register_with(&*method, contacts, model, OF_CASES));
             cpu_ms = cpu_ms.zip(thread_cpu_ms().zip(before)).map(|(sum, (after, before))| sum + after - before);
             calls += result.calls;
             offset_mm.push(

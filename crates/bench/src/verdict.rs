@@ -11,7 +11,7 @@ use serde::Serialize;
 use strum::IntoEnumIterator as _;
 
 use super::Machine;
-use super::registration::{Masks, images, masks, points};
+use super::registration::{Masks, OF_CASES, images, masks, points};
 use crate::json::JsonArgs;
 use touch2touch::headless::{ModelArgs, Output, VerbResult};
 use touch2touch_bench::known::{Case, CaseSet, Suite};
@@ -350,7 +350,7 @@ fn row(fault: Fault, trial: &Trial, models: &[ToolModel], engine: Registration) 
     let points = points(case, &case.masks).unwrap_or_default();
     let contacts = Contacts { points: &points, images: &images };
     let method = engine.method();
-    let ask = Ask { evidence: true, ..Ask::default() };
+    let ask = Ask { evidence: true, ..OF_CASES };
     let found = tool.and_then(|tool| register_with(&*method, contacts, tool, ask).ok());
     let error = |report: &AlignReport| {
         angle_error(report.grasp_from_object.theta_rad, case.grasp_from_object.theta_rad).to_degrees()

@@ -17,6 +17,7 @@ use crate::steps::models::Models;
 use crate::steps::recipe::Recipe;
 use space::{Ground, InSpace, SpacePane, SpacePicture, SpaceView, ViewAngles, in_space};
 use touch2touch_core::dataset::PairId;
+use touch2touch_core::grid::Grid;
 
 const WHAT: &str = "Still";
 /// Width of a still at scale 1, pixels; it is as high as it is wide.
@@ -91,6 +92,42 @@ impl StillSetup {
     }
 }
 
+/// Name and note of a pair as it is drawn: `draw` frames it, and what that returns draws it turned about the vertical by an angle
+/// in degrees.
+fn framed<F>(
+    dataset: &Dataset,
+    setup: &StillSetup,
+    models: &Models,
+    draw: impl FnOnce(&InSpace, &SpaceView) -> Result<F, TaskError>,
+    cx: &JobCx,
+) -> Result<([String; 2], F), TaskError> {
+    setup.check()?;
+    let name = dataset.index.get(setup.pair).map_or_else(String::new, |entry| entry.name.clone());
+    let sample = dataset
+        .load(setup.pair)
+        .map(Arc::new)
+        .map_err(|err| TaskError::from_error(format!("{WHAT}: load {name}"), &err).with_hint(err.hint))?;
+    let pair = in_space(dataset, setup, &sample, models, cx)?;
+    let StillSetup { pane, ground, angles, distance_m, .. } = *setup;
+    let turned = draw(&pair, &SpaceView { pane, ground, angles, distance_m, size_px: [setup.width_px; 2] })?;
+    Ok(([name, pair.note], turned))
+}
+
+/// The picture of [`still`] without a file.
+///
+/// # Errors
+/// As [`still`].
+pub fn picture<F: FnMut(f64) -> Result<SpacePicture, TaskError>>(
+    dataset: &Dataset,
+    setup: &StillSetup,
+    models: &Models,
+    draw: impl FnOnce(&InSpace, &SpaceView) -> Result<F, TaskError>,
+    cx: &JobCx,
+) -> Result<Grid<[u8; 4]>, TaskError> {
+    let (_, mut turned) = framed(dataset, setup, models, draw, cx)?;
+    turned(0.0).map(|picture| picture.pixels)
+}
+
 /// Draws a pair and writes it: a PNG file, or `frame_0001.png` and so on into a folder. `draw` frames it, and what that returns
 /// draws it turned about the vertical by an angle in degrees.
 ///
@@ -105,22 +142,13 @@ pub fn still<F: FnMut(f64) -> Result<SpacePicture, TaskError> + Send>(
     out: &Path,
     cx: &JobCx,
 ) -> Result<StillFiles, TaskError> {
-    setup.check()?;
-    let name = dataset.index.get(setup.pair).map_or_else(String::new, |entry| entry.name.clone());
-    let sample = dataset
-        .load(setup.pair)
-        .map(Arc::new)
-        .map_err(|err| TaskError::from_error(format!("{WHAT}: load {name}"), &err).with_hint(err.hint))?;
-    let pair = in_space(dataset, setup, &sample, models, cx)?;
+    let ([name, note], mut turned) = framed(dataset, setup, models, draw, cx)?;
     let frames = setup.turntable.unwrap_or(1);
     if setup.turntable.is_some() {
         std::fs::create_dir_all(out)
             .map_err(|err| TaskError::new(WHAT, format!("cannot make the folder: {err} ({})", out.display())))?;
     }
-    let size_px = [setup.width_px; 2];
-    let StillSetup { pane, ground, angles, distance_m, .. } = *setup;
-    let mut turned = draw(&pair, &SpaceView { pane, ground, angles, distance_m, size_px })?;
-    let mut done = StillFiles { files: Vec::new(), size_px, px_per_mm: 0.0, note: pair.note.clone() };
+    let mut done = StillFiles { files: Vec::new(), size_px: [setup.width_px; 2], px_per_mm: 0.0, note };
     let mut last: Option<SpacePicture> = None;
     for frame in 0..=frames {
         cx.check(WHAT)?;

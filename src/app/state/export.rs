@@ -13,8 +13,10 @@ pub struct ExportState {
     pub masks: ExportChoice,
     /// The import of masks that is asked about.
     pub importing: Option<ImportForm>,
-    /// The number of imports that were asked about.
-    pub(in crate::app) imports: u64,
+    /// The 3D picture that is asked about, with the number of the asking.
+    pub still: Option<(StillAsked, u64)>,
+    /// The number of times that something was asked about.
+    pub(in crate::app) asked: u64,
 }
 
 /// A picture of the selected pair in 3D, as a person asks for it.

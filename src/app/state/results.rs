@@ -12,7 +12,7 @@ use super::super::keys::{
 };
 use super::cache::Cache;
 use super::inspect::Inspection;
-use touch2touch_core::grid::{DepthMap, RgbGrid};
+use touch2touch_core::grid::{DepthMap, Grid, RgbGrid};
 use touch2touch_core::postprocess::Flag;
 use touch2touch_core::sample::Sample;
 use touch2touch_core::which_tool::Candidate;
@@ -76,6 +76,8 @@ macro_rules! table {
         Deviation(DeviationKey => Deviation, Deviation::bytes) in deviations, 63 * MIB;
         /// All tools of the data set, ranked for the touch of a pose.
         Ranking(RankingKey => Vec<Candidate>, |found| found.len() * size_of::<Candidate>()) in rankings, MIB;
+        /// The preview of a 3D picture.
+        Still(StillKey => Grid<[u8; 4]>, |picture| picture.len() * 4) in stills, 4 * MIB;
         /// A small picture of a pair's measured imprint (right finger, else left).
         Thumbnail(ThumbnailKey => DepthMap, |picture| picture.len() * 4) in thumbnails, 32 * MIB;
         }

@@ -14,6 +14,7 @@ use crate::app::tasks::TaskKind;
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::SMALL;
 use crate::ui::parts::widget::curves;
+use crate::ui::parts::widget::scroll_to_focus;
 
 /// Nothing is kept between frames.
 pub(crate) type Memory = ();
@@ -50,6 +51,7 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
             (Network::Masks, Some(trained)) => masks::worth(cx, ui, &trained),
             (Network::Masks, None) => {}
         }
+        scroll_to_focus(ui);
     });
 }
 

@@ -236,7 +236,7 @@ fn scoring(cx: &mut Cx<'_>, ui: &mut Ui) {
         }
         None if scored < total && Action::PredictAll.command(cx.state).is_some() => {
             cx.action_button(ui, Action::PredictAll, "Predict all");
-            ui.label(caption(format!("{scored} of {total} scored"), cx.p));
+            ui.add(egui::Label::new(caption(format!("{scored} of {total} scored"), cx.p)).extend());
         }
         None => {}
     });

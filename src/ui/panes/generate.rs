@@ -12,6 +12,7 @@ use crate::app::settings::{GenerateSettings, STEPS};
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{SMALL, caption, section, value};
 use crate::ui::parts::widget::choice::choose;
+use crate::ui::parts::widget::scroll_to_focus;
 use touch2touch_core::postprocess::{CorrectionPart, CorrectionParts};
 use touch2touch_pipeline::steps::bundles::{BundleInfo, BundleKind};
 
@@ -58,6 +59,7 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
             cx.push(prefer(move |s| s.generate = new.clone()));
         }
         results(cx, ui);
+        scroll_to_focus(ui);
     });
 }
 

@@ -19,6 +19,7 @@ use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{CONTACT, IGNORED, PROPOSED, SMALL, caption, section};
 use crate::ui::parts::widget::choice::choose;
 use crate::ui::parts::widget::icon::{self, Icon};
+use crate::ui::parts::widget::scroll_to_focus;
 use touch2touch_core::label::{DrawTool, Paint};
 use touch2touch_core::units;
 use touch2touch_pipeline::labels::MAX_NOTE;
@@ -55,6 +56,7 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
             correct(cx, ui);
         });
         progress::show(cx, ui);
+        scroll_to_focus(ui);
     });
 }
 

@@ -11,6 +11,7 @@ use crate::app::state::{Absent, Lookup};
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{SMALL, caption, grade_color, section, value};
 use crate::ui::parts::widget::line::Line;
+use crate::ui::parts::widget::scroll_to_focus;
 use strum::IntoEnumIterator as _;
 use touch2touch_core::postprocess::Severity;
 use touch2touch_core::sample::Scale;
@@ -30,6 +31,7 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
         pose(cx, ui);
         comparison(cx, ui);
         flag(cx, ui);
+        scroll_to_focus(ui);
     });
 }
 
@@ -47,8 +49,13 @@ fn pair(cx: &Cx<'_>, ui: &mut Ui) {
     });
 }
 
+fn is_doubted(cx: &Cx<'_>, source: ImprintSource) -> bool {
+    let verdict = results::pose(cx.state, source).shown().and_then(|pose| pose.verdict.as_ref());
+    verdict.is_some_and(|verdict| verdict.grade > Grade::Good)
+}
+
 /// The likeliest tools where that was asked, else the offer to try them where the pose is doubted.
-fn tools(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, pose: &PoseResult) {
+fn tools(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
     match results::ranking(cx.state, source) {
         Some(Lookup::Ready(all)) => {
             ui.label(RichText::new(format!("Tool: {}", in_words(all))).size(SMALL).color(cx.p.strong));
@@ -73,7 +80,8 @@ fn tools(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, pose: &PoseResult)
         Some(_) => {
             ui.label(caption("Trying all tools…", cx.p));
         }
-        None if pose.verdict.as_ref().is_some_and(|verdict| verdict.grade > Grade::Good) => {
+        // One button for both sides: the first that is doubted has it.
+        None if ImprintSource::iter().find(|side| is_doubted(cx, *side)) == Some(source) => {
             let button = ui.add(Button::new(RichText::new(Action::TryTools.name()).size(SMALL)).small());
             if button.on_hover_text(Action::TryTools.help()).clicked() {
                 cx.act(Action::TryTools);
@@ -104,7 +112,7 @@ fn pose(cx: &mut Cx<'_>, ui: &mut Ui) {
         });
         if let Some(pose) = results::pose(cx.state, source).shown() {
             verdict(cx, ui, pose);
-            tools(cx, ui, source, pose);
+            tools(cx, ui, source);
             place(cx, ui, source, pose);
         }
     }

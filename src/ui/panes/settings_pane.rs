@@ -10,6 +10,7 @@ use crate::app::settings::{ColorMap, MAX_CACHE_MIB};
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{caption, section};
 use crate::ui::parts::widget::choice::choose;
+use crate::ui::parts::widget::scroll_to_focus;
 use touch2touch_pipeline::infer::engine::EngineChoice;
 use touch2touch_pipeline::labels::system_person;
 
@@ -18,7 +19,10 @@ pub(crate) type Memory = ();
 
 /// The pane.
 pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
-    ScrollArea::vertical().id_salt("settings").show(ui, |ui| body(cx, ui));
+    ScrollArea::vertical().id_salt("settings").show(ui, |ui| {
+        body(cx, ui);
+        scroll_to_focus(ui);
+    });
 }
 
 /// Who labels.

@@ -518,7 +518,10 @@ impl eframe::App for StudioApp {
             let export = &state.export;
             let place = shortcuts::Place {
                 covered,
-                dialog: export.asking_masks || export.importing.is_some() || cx.shared.dialogs.waiting,
+                dialog: export.asking_masks
+                    || export.importing.is_some()
+                    || export.still.is_some()
+                    || cx.shared.dialogs.waiting,
                 labeling: state.is_labeling(),
             };
             let possible = |action: Action| action.command(state).is_some() && shortcuts::fits_pane(action, over);
@@ -553,6 +556,7 @@ impl eframe::App for StudioApp {
             doctor::panel(&mut cx, &ctx);
             export::masks_form(&mut cx, &ctx);
             export::import_form(&mut cx, &ctx);
+            export::still_form(&mut cx, &ctx);
             palette::show(&mut cx, &ctx, &mut self.palette);
             shortcuts::list(&mut cx, &ctx, &mut self.shortcuts);
             unsaved::question(&mut cx, &ctx);

@@ -1,6 +1,6 @@
 //! Taking things away: the menu in each pane's title.
 
-use eframe::egui::{self, RichText, Ui, vec2};
+use eframe::egui::{self, Align2, Color32, ColorImage, FontId, Rect, RichText, Sense, Ui, Vec2, vec2};
 use strum::IntoEnumIterator as _;
 
 use crate::app::action::Action;
@@ -21,30 +21,93 @@ use touch2touch_pipeline::still::space::Ground;
 /// Frames of a turntable: six seconds of a film.
 const FRAMES: u32 = 180;
 
-/// Pictures of a 3D view from where it looks now; the verb makes them in any size.
-fn stills(cx: &mut Cx<'_>, ui: &mut Ui) {
-    let angles = cx.shared.angles[cx.state.workbench.side as usize];
-    let pane = cx.state.settings.scene_sides();
-    let asked = StillAsked { pane, width_px: 2 * WIDTH_PX, ground: Ground::White, angles, turntable: None };
-    for (asked, text) in [
-        (asked, "Save 3D picture…"),
-        (StillAsked { ground: Ground::Transparent, ..asked }, "Save 3D picture without ground…"),
-        (StillAsked { turntable: Some(FRAMES), ..asked }, "Save a turn around the pair…"),
-    ] {
-        let frames = asked.turntable.map_or("as PNG".to_owned(), |frames| format!("as {frames} PNG files"));
-        let tip = format!("{frames}, {0} x {0} pixels; the verb `still` has other sizes", asked.width_px);
-        let button = ui.add_enabled(export::can_draw(cx.state), egui::Button::new(text));
-        if button.on_hover_text(tip).clicked() {
-            cx.push(ExportCommand::Place(Output::Still(asked)));
-            ui.close();
-        }
+/// The row that asks for a picture of a 3D view.
+fn still(cx: &mut Cx<'_>, ui: &mut Ui) {
+    let button = ui.add_enabled(export::can_draw(cx.state), egui::Button::new("Save 3D picture…"));
+    if button.on_hover_text("PNG of this pair, in a size and on a ground of your choice").clicked() {
+        let asked = StillAsked {
+            pane: cx.state.settings.scene_sides(),
+            width_px: 2 * WIDTH_PX,
+            ground: Ground::White,
+            angles: cx.shared.angles[cx.state.workbench.side as usize],
+            turntable: None,
+        };
+        cx.push(ExportCommand::AskStill(Some(asked)));
+        ui.close();
     }
+}
+
+/// The form of a 3D picture, where it is open, with what would be saved: the pair on screen from where the view looks now.
+pub(crate) fn still_form(cx: &mut Cx<'_>, ctx: &egui::Context) {
+    let Some((before, _)) = cx.state.export.still else { return };
+    let angles = cx.shared.angles[cx.state.workbench.side as usize];
+    let mut asked = StillAsked { pane: cx.state.settings.scene_sides(), angles, ..before };
+    let closed = form(ctx, "Save 3D picture", |ui| {
+        ui.horizontal(|ui| {
+            ui.label(caption("Size", cx.p));
+            for scale in [1, 2, 4] {
+                let px = scale * WIDTH_PX;
+                ui.radio_value(&mut asked.width_px, px, format!("{scale}x"))
+                    .on_hover_text(format!("{px} x {px} pixels"));
+            }
+            ui.add_space(16.0);
+            ui.label(caption("Ground", cx.p));
+            for (ground, text) in
+                [(Ground::White, "white"), (Ground::Black, "black"), (Ground::Transparent, "transparent")]
+            {
+                ui.radio_value(&mut asked.ground, ground, text);
+            }
+        });
+        let mut turntable = asked.turntable.is_some();
+        let tip = format!(
+            "A folder with {FRAMES} frames once around the pair, six seconds of a film, in place of one picture"
+        );
+        ui.checkbox(&mut turntable, "turntable").on_hover_text(tip);
+        asked.turntable = turntable.then_some(FRAMES);
+        preview(cx, ui);
+        let save = ui.add_enabled(export::can_draw(cx.state), egui::Button::new("Save…"));
+        if save.accessible_name("Choose where the 3D picture goes").clicked() {
+            cx.push(ExportCommand::Place(Output::Still(asked)));
+        }
+    });
+    if closed {
+        cx.push(ExportCommand::AskStill(None));
+    } else if asked != before {
+        cx.push(ExportCommand::AskStill(Some(asked)));
+    }
+}
+
+/// The picture that would be saved, or the one before while it is drawn.
+fn preview(cx: &mut Cx<'_>, ui: &mut Ui) {
+    const SLOT: &str = "preview of a 3D picture";
+    let (rect, response) = ui.allocate_exact_size(Vec2::splat(ui.available_width()), Sense::hover());
+    let key = export::still_key(cx.state);
+    let found = key.as_ref().map(|key| cx.state.look(key.clone()).value());
+    let texture = match (&found, key) {
+        (Some(Lookup::Ready(picture)), Some(key)) => {
+            let image =
+                || (ColorImage::from_rgba_unmultiplied(picture.size(), picture.as_slice().as_flattened()), None);
+            Some(cx.shared.textures.get(ui.ctx(), SLOT, key, false, image))
+        }
+        _ => cx.shared.textures.last(SLOT),
+    };
+    if let Some(picture) = texture {
+        let uv = Rect::from_min_max(egui::Pos2::ZERO, egui::pos2(1.0, 1.0));
+        ui.painter().image(picture.texture.id(), rect, uv, Color32::WHITE);
+    }
+    let said = match &found {
+        Some(Lookup::Failed(err)) => err.to_string(),
+        Some(Lookup::Ready(_)) => String::new(),
+        _ => "Drawing…".to_owned(),
+    };
+    ui.painter().text(rect.left_top() + vec2(6.0, 4.0), Align2::LEFT_TOP, said, FontId::proportional(12.0), cx.p.weak);
+    response.on_hover_text("Turn the 3D view to look from elsewhere");
 }
 
 /// Menu of the files that a pane offers.
 pub(crate) fn menu(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane) {
     if pane.kind() == Kind::Scene {
-        stills(cx, ui);
+        still(cx, ui);
         ui.separator();
     }
     let sides: &[Action] = match pane.side() {

@@ -13,6 +13,7 @@ use crate::app::state::{Absent, Lookup, State};
 use crate::ui::parts::cx::{Cx, side_color};
 use crate::ui::parts::made_with;
 use crate::ui::parts::theme::{Palette, SMALL, medium, pane_frame};
+use crate::ui::parts::widget::focused;
 use crate::ui::parts::widget::help;
 
 macro_rules! views {
@@ -72,11 +73,6 @@ impl Panes {
             ctx.memory_mut(|memory| memory.request_focus(stop(self.drawn[next as usize])));
         }
     }
-}
-
-/// The widget that has the keyboard focus.
-fn focused(ctx: &egui::Context) -> Option<egui::Response> {
-    ctx.memory(egui::Memory::focused).and_then(|id| ctx.read_response(id))
 }
 
 /// The widget that stands for a whole pane among those that Tab goes through.

@@ -261,13 +261,16 @@ fn mask_choice() -> impl Strategy<Value = ExportChoice> {
     })
 }
 
-fn output() -> impl Strategy<Value = Output> {
+fn still() -> impl Strategy<Value = StillAsked> {
     let still = (any_of::<SpacePane>(), any::<u32>(), any_of::<Ground>(), any::<[f64; 2]>(), any::<Option<u32>>());
-    let still = still.prop_map(|(pane, width_px, ground, [yaw_deg, pitch_deg], turntable)| {
+    still.prop_map(|(pane, width_px, ground, [yaw_deg, pitch_deg], turntable)| {
         let angles = ViewAngles { yaw_deg, pitch_deg };
         StillAsked { pane, width_px, ground, angles, turntable }
-    });
-    prop_oneof![Just(Output::Masks), source().prop_map(Output::Pair), still.prop_map(Output::Still),]
+    })
+}
+
+fn output() -> impl Strategy<Value = Output> {
+    prop_oneof![Just(Output::Masks), source().prop_map(Output::Pair), still().prop_map(Output::Still),]
 }
 
 fn statistics() -> ShiftStatistics {
@@ -486,6 +489,7 @@ draws! {
         1 AskMasks(any::<bool>()),
         1 SetMasks(mask_choice()),
         1 AskImport(select(vec![None, Some(PathBuf::from("/dev/null/folder"))])),
+        1 AskStill(proptest::option::of(still())),
         1 ImportOverHand(any::<bool>()),
         1 Import,
         1 Place(output()),

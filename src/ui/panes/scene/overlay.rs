@@ -106,7 +106,9 @@ fn axes_and_scale(p: &Palette, painter: &egui::Painter, camera: &Camera, output:
     }
     // In the plane of the target, as all perspective scale bars.
     let per_m = camera.px_per_m(output.size) * f64::from(rect.height()) / f64::from(output.size[1].max(1));
-    let Some(length) = [0.05, 0.02, 0.01, 0.005, 0.002, 0.001].into_iter().find(|l| l * per_m <= 110.0) else {
+    // Beside the legend.
+    let room = f64::from((rect.width() - 110.0).min(110.0));
+    let Some(length) = [0.05, 0.02, 0.01, 0.005, 0.002, 0.001].into_iter().find(|l| l * per_m <= room) else {
         return;
     };
     let width = (length * per_m) as f32;
