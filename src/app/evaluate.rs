@@ -6,13 +6,15 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::effect::{Access, Effect};
-use super::jobs::Worker;
-use super::results;
+use super::jobs::{Job, Worker};
+use super::keys::ScoredKey;
+use super::results::{self, Computes, Demands};
+use super::services::Services;
 use super::state::State;
 use super::state::tasks::{Level, TaskKind};
 use super::tasks::{self, Start};
 use touch2touch_pipeline::job::JobCx;
-use touch2touch_pipeline::scores::evaluate::{self, Evaluation};
+use touch2touch_pipeline::scores::evaluate::{self, Evaluation, Kept};
 
 /// A command to the results table.
 #[derive(Clone, Debug)]
@@ -43,7 +45,16 @@ pub(super) fn step(state: &mut State, command: EvaluateCommand, effects: &mut Ve
             let source = open.source.clone();
             let start = Start::new(TaskKind::Evaluate, format!("Predict all of {}", source.dataset.title));
             let run = move |access: &Access, cx: &JobCx| {
-                evaluate::evaluate(&source.dataset, &setup, &access.services.models, cx).map(Arc::new)
+                let folder = access.services.evaluations.as_ref();
+                // As the data are now: what changes meanwhile is not scored.
+                let kept = folder.map(|folder| Kept::of(folder, &source.dataset, &setup));
+                let evaluation = evaluate::evaluate(&source.dataset, &setup, &access.services.models, cx)?;
+                if let Some(kept) = kept.filter(|_| evaluation.complete)
+                    && let Err(err) = kept.write(&evaluation)
+                {
+                    log::warn!("The scores could not be kept for the next start: {err}");
+                }
+                Ok(Arc::new(evaluation))
             };
             tasks::start(state, start, effects, run, scored);
         }
@@ -74,5 +85,34 @@ pub fn scored(evaluation: &Arc<Evaluation>, state: &mut State, _: &mut Vec<Effec
     if let Some(open) = &state.library.open {
         state.table.take(evaluation, &open.source.dataset.index);
         state.reorder();
+    }
+}
+
+impl Computes for ScoredKey {
+    fn job(&self, state: &State, services: &Arc<Services>) -> Option<Job<Option<Arc<Evaluation>>>> {
+        let (setup, open) = (results::evaluation_setup(state)?, state.library.open.as_ref()?);
+        let (source, services) = (open.source.clone(), services.clone());
+        Some(Job::new(Worker::Files, "Look for earlier scores", move |_| {
+            let kept = services.evaluations.as_ref().map(|folder| Kept::of(folder, &source.dataset, &setup));
+            Ok(kept.and_then(|kept| kept.read(setup)).map(Arc::new))
+        }))
+    }
+
+    fn is_there(&self, state: &State) -> bool {
+        state.table.looked_up == Some(self.0)
+    }
+
+    fn wanted(wants: &mut Demands<'_>) {
+        let state = wants.state;
+        if let Some(open) = state.library.open.as_ref().filter(|_| results::evaluation_setup(state).is_some()) {
+            wants.ask(ScoredKey(open.seq));
+        }
+    }
+
+    fn arrived(&self, state: &mut State, found: &Arc<Option<Arc<Evaluation>>>) {
+        state.table.looked_up = Some(self.0);
+        if let Some(evaluation) = found.as_ref().as_ref().filter(|_| state.table.result.is_none()) {
+            scored(evaluation, state, &mut Vec::new());
+        }
     }
 }

@@ -42,6 +42,8 @@ named! {
     ThumbnailKey(PairKey);
     /// The labels stored for a pair.
     LabelsKey(PairKey);
+    /// The last evaluation of a data set, which lies on the disk from before.
+    ScoredKey(DatasetSeq);
     /// The predictions of a touch that lie on the disk from before.
     StoredKey(TouchKey);
     /// The picture beside a touch.

@@ -29,6 +29,8 @@ pub struct Services {
     pub models_folder: Option<PathBuf>,
     /// The folder of tuning that was stopped.
     pub unfinished: Option<PathBuf>,
+    /// The folder of the last evaluation of each data set.
+    pub evaluations: Option<PathBuf>,
     /// The folder of labels that could not be saved.
     pub waiting: Option<PathBuf>,
     /// The models.
@@ -47,6 +49,7 @@ impl Services {
             config_folder: folders::config(),
             models_folder: models_folder(),
             unfinished: unfinished_folder(),
+            evaluations: folders::data().map(|folder| folder.join("evaluations")),
             waiting: folders::data().map(|folder| folder.join("recovered")),
             models: Models::new(store::user_folder().map(|folder| Store::new(folder, store::DEFAULT_BUDGET))),
             ..Self::with_config_folder(None)
@@ -59,6 +62,7 @@ impl Services {
         Self {
             models_folder: inside("models"),
             unfinished: inside("unfinished"),
+            evaluations: inside("evaluations"),
             waiting: inside("recovered"),
             models: Models::new(inside("predictions").map(|folder| Store::new(folder, store::DEFAULT_BUDGET))),
             config_folder: folder,

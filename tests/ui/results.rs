@@ -98,8 +98,19 @@ fn a_table_is_made_by_a_click_shown_and_exported() {
     rig.click(&format!("{}: 4 grasps, 8 images", table.rows[0].method));
     assert!(rig.state().table.by().unwrap().0.upper_bound);
 
-    // A table is of one data set.
+    // A table is of one data set, and there again with it until something of that changes.
+    let (angle, psnr) = (value(&rig, 1, 0, Metric::Angle), value(&rig, 1, 0, Metric::Psnr));
     rig.send(LibraryCommand::Open(Place::Demo));
     assert!(rig.state().table.result.is_none());
     assert!(rig.state().table.scores.sources.is_empty());
+    rig.send(LibraryCommand::Open(Place::Path(data.clone())));
+    let again = rig.state().table.result.clone().expect("the table is kept");
+    assert_eq!((&again.rows, &again.setup, again.scored), (&table.rows, &table.setup, table.scored));
+    assert_eq!((value(&rig, 1, 0, Metric::Angle), value(&rig, 1, 0, Metric::Psnr)), (angle, psnr));
+    let file = rig.state().library.open.as_ref().unwrap().source.dataset.pair_files(PairId(0)).remove(0);
+    let file = std::fs::OpenOptions::new().append(true).open(file).unwrap();
+    file.set_modified(std::time::SystemTime::UNIX_EPOCH).unwrap();
+    rig.send(LibraryCommand::Open(Place::Demo));
+    rig.send(LibraryCommand::Open(Place::Path(data)));
+    assert!(rig.state().table.result.is_none());
 }

@@ -16,7 +16,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
-use serde::Serialize;
+use serde::{Deserialize, Deserializer, Serialize};
 
 use super::catalog;
 use super::dataset::{PairEntry, Split};
@@ -36,7 +36,7 @@ pub const PEAK_M: f64 = 0.0225;
 const BOOTSTRAP_SEED: u64 = 1;
 
 /// Grasps that are averaged together: a column group of the table.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Group {
     /// Grasps of tools that were trained on, which were not.
@@ -96,7 +96,7 @@ impl Group {
 }
 
 /// A squared error that can be pooled.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SquaredError {
     /// Sum over the pixels, m² (or of the stretched images).
     pub sum: f64,
@@ -105,7 +105,7 @@ pub struct SquaredError {
 }
 
 /// The figures of one predicted image.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ImageScore {
     /// Finger: 0 right, 1 left.
     pub finger: usize,
@@ -123,7 +123,7 @@ pub struct ImageScore {
 }
 
 /// The figures of one grasp by one method.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GraspScore {
     /// The pair's name.
     pub pair: String,
@@ -137,7 +137,7 @@ pub struct GraspScore {
     pub images: Vec<ImageScore>,
     /// Error of the in-hand angle, radians, without sign; NaN (null in files) without a pose, `None` (absent in files) where
     /// no truth is known.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none", default, deserialize_with = "null_is_nan")]
     pub angle_error_rad: Option<f64>,
     /// Distance of the estimated place of the tool in the hand from the true one, meters; `None` without a pose or truth.
     pub position_error_m: Option<f64>,
@@ -145,8 +145,13 @@ pub struct GraspScore {
     pub verdict: Option<Grade>,
 }
 
+/// A number that is there; null is NaN.
+fn null_is_nan<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error> {
+    Ok(Some(Option::deserialize(from)?.unwrap_or(f64::NAN)))
+}
+
 /// A method with its grasps.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Scores {
     /// The row's name.
     pub method: String,
@@ -160,7 +165,7 @@ pub struct Scores {
 }
 
 /// A figure with its 95 % interval.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
     /// The figure.
     pub value: f64,
@@ -169,7 +174,7 @@ pub struct Estimate {
 }
 
 /// A row of the table.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Row {
     /// The method.
     pub method: String,

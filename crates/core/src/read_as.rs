@@ -321,7 +321,7 @@ impl ReadAs {
             Self::Scale(depths, factor) if factor < 0.0 => format!("{} have the other sign", imprints(depths)),
             Self::Scale(depths, factor) => format!("{} are {} times too large", imprints(depths), 1.0 / factor),
             Self::ScaleCamera(factor) => format!("the camera matrices are {} times too large", 1.0 / factor),
-            Self::CadAxes(axes) => format!("the CAD models have other axes ({axes} are x, y and z)"),
+            Self::CadAxes(axes) => format!("the CAD models have other axes ({axes} instead of xyz)"),
             Self::NegateTheta => "theta has the other sign".into(),
             Self::ImageSwapFingers => "the color images of the fingers are swapped".into(),
             Self::ImageLay(lay) => format!("the color images are {}", lay.text()),

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
+use super::super::keys::DatasetSeq;
 use super::super::scores::{ScoreTable, SourceScores};
 use touch2touch_core::dataset::{Index, PairId};
 use touch2touch_core::evaluation::{Condition, Metric, Row, Scores, paper_rows};
@@ -18,6 +19,8 @@ pub struct TableState {
     pub published: bool,
     /// The last table of the open data set.
     pub result: Option<Arc<Evaluation>>,
+    /// The opening that an evaluation from before was looked for.
+    pub(in crate::app) looked_up: Option<DatasetSeq>,
     /// The scores of the pairs of the open data set, as lists show them.
     pub scores: Arc<ScoreTable>,
     /// The scores that these are made of, with the recipe that they have in common.

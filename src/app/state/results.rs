@@ -23,6 +23,7 @@ use touch2touch_pipeline::export::Plan;
 use touch2touch_pipeline::export::import::Import;
 use touch2touch_pipeline::learn::train::TrainPlan;
 use touch2touch_pipeline::masks::propose::Proposal;
+use touch2touch_pipeline::scores::evaluate::Evaluation;
 use touch2touch_pipeline::steps::estimate::Estimate;
 use touch2touch_pipeline::steps::layers::LayerResult;
 use touch2touch_pipeline::steps::prediction::Prediction;
@@ -42,6 +43,8 @@ macro_rules! table {
         About(AboutKey => Vec<Fact>, |facts| facts.len() * 512) in abouts, MIB;
         /// The CAD model of a tool and what the registration derives from it.
         Tool(ToolKey => LoadedTool, tool_bytes) in tools, 128 * MIB;
+        /// The last evaluation of the data set, which lies on the disk from before.
+        Scored(ScoredKey => Option<Arc<Evaluation>>);
         /// The predictions of a touch that lie on the disk from before.
         Stored(StoredKey => Keyed);
         /// Raw predictions: of the pair on screen, of its other finger, of what is compared.

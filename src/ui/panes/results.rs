@@ -59,7 +59,7 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
     };
     ui.horizontal(|ui| {
         let about: Vec<&str> =
-            std::iter::once(result.conventions).chain(result.notes.iter().map(String::as_str)).collect();
+            std::iter::once(&*result.conventions).chain(result.notes.iter().map(String::as_str)).collect();
         ui.label(RichText::new(result.size()).color(cx.p.strong)).on_hover_text(about.join("\n"));
         if !result.complete {
             ui.label(RichText::new("stopped early").size(SMALL).color(cx.p.caution));

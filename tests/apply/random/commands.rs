@@ -286,7 +286,7 @@ fn evaluation() -> Evaluation {
         dataset: "Double".into(),
         rows: Vec::new(),
         groups: Vec::new(),
-        conventions: "",
+        conventions: "".into(),
         notes: Vec::new(),
         findings: Vec::new(),
         skipped: Vec::new(),

@@ -273,7 +273,7 @@ fn of_models(
             return Some((Doubt::stored(ReadAs::CadAxes(axes), &figures), by_axes));
         }
         let what = format!(
-            "the CAD models of {} have other axes ({}), {axes} as x, y and z: {figures}",
+            "the CAD models of {} have other axes ({}), {axes} instead of xyz: {figures}",
             counted(names.len(), "tool"),
             names.join(", ")
         );

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use serde::Serialize;
-use serde::ser::{SerializeMap as _, Serializer};
+use serde::ser::SerializeMap as _;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::{Estimate, GraspScore, Group, Metric, Row, angles, images, mean, psnr};
 use crate::metrics::frechet_distance;
@@ -128,7 +128,7 @@ const fn hundredths(heading: &'static str, key: &'static str, tip: &'static str,
 }
 
 /// The figures of one method in one column group. A column without one cannot be there, as the notes say.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TableMetrics {
     /// The column group.
     pub group: Group,
@@ -141,7 +141,7 @@ pub struct TableMetrics {
     /// Grasps without a pose: failures.
     pub without_pose: usize,
     /// By the column's name in files.
-    #[serde(flatten, serialize_with = "by_column")]
+    #[serde(flatten, serialize_with = "by_column", deserialize_with = "of_columns")]
     pub figures: BTreeMap<&'static str, Estimate>,
 }
 
@@ -168,6 +168,17 @@ fn by_column<S: Serializer>(figures: &BTreeMap<&'static str, Estimate>, to: S) -
         }
     }
     map.end()
+}
+
+/// The figures that [`by_column`] wrote.
+fn of_columns<'de, D: Deserializer<'de>>(from: D) -> Result<BTreeMap<&'static str, Estimate>, D::Error> {
+    let mut written = BTreeMap::<String, serde_json::Value>::deserialize(from)?;
+    let figure = |column: &Column| {
+        let written = written.remove(column.key)?;
+        let plain = written.as_f64().map(|value| Estimate { value, interval: None });
+        Some((column.key, plain.or_else(|| serde_json::from_value(written).ok())?))
+    };
+    Ok(COLUMNS.iter().filter_map(figure).collect())
 }
 
 /// The columns that some row fills.

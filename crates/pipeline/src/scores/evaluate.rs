@@ -3,14 +3,16 @@
 //! studio's Evaluate pane both call [`evaluate`].
 
 mod export;
+mod kept;
 mod load;
 mod methods;
 mod tool;
 
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::time::Instant;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::doubts;
 use crate::error::TaskError;
@@ -29,6 +31,7 @@ use touch2touch_core::rig::PadId;
 use touch2touch_core::sample::Scale;
 
 pub use export::{Report, csv, export, rows};
+pub use kept::Kept;
 
 /// Name of the task in errors.
 const WHAT: &str = "Evaluate";
@@ -83,7 +86,7 @@ impl Default for Setup {
 }
 
 /// Something that could not be scored.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Skipped {
     /// The pair or the tool.
     pub what: String,
@@ -94,7 +97,7 @@ pub struct Skipped {
 }
 
 /// The table with what is behind it.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Evaluation {
     /// The data set's title.
     pub dataset: String,
@@ -103,7 +106,7 @@ pub struct Evaluation {
     /// The column groups.
     pub groups: Vec<Group>,
     /// Meaning of PSNR and SSIM.
-    pub conventions: &'static str,
+    pub conventions: Cow<'static, str>,
     /// Meaning of the columns, and reasons for what is missing.
     pub notes: Vec<String>,
     /// Oddities of the files, by kind.
@@ -117,6 +120,7 @@ pub struct Evaluation {
     /// True where everything asked for was scored; false if stopped early.
     pub complete: bool,
     /// Settings of the evaluation.
+    #[serde(skip_deserializing)]
     pub setup: Setup,
     /// The engine of the models and its threads.
     pub runtime: String,
@@ -207,7 +211,7 @@ pub fn evaluate(
         dataset: dataset.title.clone(),
         rows,
         groups,
-        conventions: evaluation::conventions(scale),
+        conventions: evaluation::conventions(scale).into(),
         notes,
         findings: findings.into_list(),
         skipped,
