@@ -92,7 +92,8 @@ impl Computes for ScoredKey {
     fn job(&self, state: &State, services: &Arc<Services>) -> Option<Job<Option<Arc<Evaluation>>>> {
         let (setup, open) = (results::evaluation_setup(state)?, state.library.open.as_ref()?);
         let (source, services) = (open.source.clone(), services.clone());
-        Some(Job::new(Worker::Files, "Look for earlier scores", move |_| {
+        // A look at every file of a large data set: nothing else waits for it.
+        Some(Job::new(Worker::Batch, "Look for earlier scores", move |_| {
             let kept = services.evaluations.as_ref().map(|folder| Kept::of(folder, &source.dataset, &setup));
             Ok(kept.and_then(|kept| kept.read(setup)).map(Arc::new))
         }))

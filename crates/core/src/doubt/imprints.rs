@@ -256,19 +256,15 @@ fn of_models(
         (stored.iter().sum::<f64>() + gained) / stored.len() as f64
     };
     let by_others = explained(&others.iter().map(|(tool, _, gain)| (*tool, *gain)).collect::<Vec<_>>());
-    let by_axes = turned.as_ref().map_or(0.0, |(_, tools)| explained(tools));
+    let by_axes = turned.as_ref().map_or(0.0, |turned| explained(&turned.tools));
     let mean = stored.iter().sum::<f64>() / stored.len() as f64;
     if others.is_empty() && turned.is_none() {
         return None;
     }
-    if let Some((axes, tools)) = turned.filter(|_| by_axes > by_others) {
+    if let Some(OtherAxes { axes, tools, of_all }) = turned.filter(|_| by_axes > by_others) {
         let names: Vec<String> = tools.iter().map(|(tool, _)| (*tool).to_owned()).collect();
         let figures = format!("the imprints then lie on them with a similarity of {by_axes:.2} instead of {mean:.2}");
         // One program drew them all, unless a tool is only right as it is.
-        let of_all = pairs.tools.iter().filter(|tool| names.iter().all(|name| name != *tool)).all(|tool| {
-            let turned = meshes.get(*tool).and_then(|mesh| DistanceField::from_mesh(&axes.apply(mesh)).ok());
-            turned.is_some_and(|field| pairs.of_tool(tool, &field) > pairs.of_tool(tool, &pairs.fields[tool]) - SAME)
-        });
         if of_all {
             return Some((Doubt::stored(ReadAs::CadAxes(axes), &figures), by_axes));
         }
@@ -341,28 +337,37 @@ fn other_models_of_some(pairs: &Pairs<'_>, stored: &[f64]) -> Option<Doubt> {
     Some(Doubt { pairs: at, ..doubt })
 }
 
-/// The axes with which most of the tools in doubt are explained, and those with their gains.
+/// Other axes of the CAD models: the tools that they explain with their gains, and whether they are as good for all others.
+struct OtherAxes<'a> {
+    axes: Axes,
+    tools: Vec<(&'a str, f64)>,
+    of_all: bool,
+}
+
+/// The axes with which all tools together lie best on their models, where some of those in doubt then clearly do.
 fn other_axes<'a>(
     pairs: &Pairs<'a>,
     meshes: &BTreeMap<String, TriMesh>,
     doubted: &[(&'a str, f64)],
-) -> Option<(Axes, Vec<(&'a str, f64)>)> {
-    let mut best: Option<(Axes, Vec<(&str, f64)>)> = None;
-    let total = |tools: &[(&str, f64)]| tools.iter().map(|(_, gain)| gain).sum::<f64>();
-    for axes in Axes::others() {
-        let mut tools = Vec::new();
-        for &(tool, as_is) in doubted {
-            let Some(field) = meshes.get(tool).and_then(|mesh| DistanceField::from_mesh(&axes.apply(mesh)).ok()) else {
-                continue;
-            };
-            let score = pairs.of_tool(tool, &field);
-            if score >= LIES_ON && score - as_is >= CLEARLY_OF_TOOL {
-                tools.push((tool, score - as_is));
-            }
-        }
-        if !tools.is_empty() && best.as_ref().is_none_or(|(_, known)| total(&tools) > total(known)) {
-            best = Some((axes, tools));
-        }
-    }
-    best
+) -> Option<OtherAxes<'a>> {
+    let tools: BTreeSet<&str> = pairs.tools.iter().copied().collect();
+    let stored: Vec<(&str, f64)> =
+        tools.into_iter().map(|tool| (tool, pairs.of_tool(tool, &pairs.fields[tool]))).collect();
+    let of = |axes: Axes| {
+        let score = |tool: &str| {
+            let field = meshes.get(tool).and_then(|mesh| DistanceField::from_mesh(&axes.apply(mesh)).ok());
+            field.map_or(0.0, |field| pairs.of_tool(tool, &field))
+        };
+        let scores: Vec<(&str, f64, f64)> = stored.iter().map(|(tool, as_is)| (*tool, score(tool), *as_is)).collect();
+        let gain: f64 = scores.iter().map(|(_, score, as_is)| score - as_is).sum();
+        let clearly = |tool: &str, score: f64, as_is: f64| {
+            let is_doubted = doubted.iter().any(|(name, _)| *name == tool);
+            is_doubted && score >= LIES_ON && score - as_is >= CLEARLY_OF_TOOL
+        };
+        let of_all = scores.iter().all(|(tool, score, as_is)| clearly(tool, *score, *as_is) || *score > as_is - SAME);
+        let tools = scores.into_iter().filter(|(tool, score, as_is)| clearly(tool, *score, *as_is));
+        (gain, OtherAxes { axes, tools: tools.map(|(tool, score, as_is)| (tool, score - as_is)).collect(), of_all })
+    };
+    let found = Axes::others().map(of).filter(|(_, found)| !found.tools.is_empty());
+    found.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, best)| best)
 }

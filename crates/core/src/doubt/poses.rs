@@ -383,11 +383,12 @@ fn graded_pose(sample: &Sample, tool: &ToolModel) -> Option<(Grade, PlanarPose)>
         depths.map(|(depth, camera)| PadImage { imprint: &depth.imprint, camera, predicted: false, tolerance });
     let images: Vec<_> = images.collect();
     let contacts = Contacts { points: &points, images: &images };
-    let ask = Ask { evidence: true, ..Ask::default() };
+    let ask = Ask { evidence: true, in_lab_grid: sample.in_lab_grid, ..Ask::default() };
     let report = register_with(&*Registration::default().method(), contacts, tool, ask).ok()?;
-    // Of equal answers the one that is stored, if one is.
-    let found = report.grasp_from_object;
-    let stored = sample.grasp_from_object.map(|truth| (Symmetry::of(tool).nearest(found, truth), truth));
-    let stored = stored.filter(|(found, truth)| is_near(*found, *truth));
-    Some((Verdict::of(&report)?.grade, stored.map_or(found, |(found, _)| found)))
+    // Of answers that fit about as well the one that is stored, if one is.
+    let answers =
+        || std::iter::once(report.grasp_from_object).chain(report.answers.iter().map(|a| a.grasp_from_object));
+    let nearest = |truth: PlanarPose| answers().map(move |found| Symmetry::of(tool).nearest(found, truth));
+    let stored = sample.grasp_from_object.and_then(|truth| nearest(truth).find(|found| is_near(*found, truth)));
+    Some((Verdict::of(&report)?.grade, stored.unwrap_or(report.grasp_from_object)))
 }
