@@ -294,7 +294,7 @@ impl Dataset {
         self.catch_panic(id, || {
             let mut loaded = match (&self.source, self.files.get(id.0 as usize)) {
                 (Source::BuiltIn(set), _) => set.load(id, alone).map(|sample| Loaded { sample, ..Loaded::default() }),
-                (_, Some(Files::Lab(halves))) => Some(self.from_lab(halves)?),
+                (_, Some(Files::Lab(halves))) => Some(self.load_lab(halves)?),
                 (_, Some(Files::Row(row))) => Some(row.load(&self.rig)?),
                 (_, Some(Files::Pictures(touch))) => Some(touch.load(&self.rig)?),
                 (_, None) => None,
@@ -311,7 +311,7 @@ impl Dataset {
         })
     }
 
-    fn from_lab(&self, halves: &lab::PairFiles) -> Result<Loaded, FileError> {
+    fn load_lab(&self, halves: &lab::PairFiles) -> Result<Loaded, FileError> {
         let mut loaded = halves.load(&self.rig)?;
         loaded.sample.in_lab_grid = *self.in_lab_grid.get_or_init(|| {
             let pose = |i: usize| match &self.files[i] {
