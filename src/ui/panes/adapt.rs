@@ -81,6 +81,10 @@ fn start(cx: &mut Cx<'_>, ui: &mut Ui, network: Network) {
         } else if learn::made(cx.state, network).is_some() {
             cx.action_button(ui, Action::UseModel, Action::UseModel.name());
         }
+        let adapted = cx.state.learn.adapted.as_ref().filter(|_| network == Network::Generator);
+        if let Some(gain) = adapted.and_then(|adapted| generator::gain(adapted)) {
+            ui.label(RichText::new(gain).color(cx.p.strong)).on_hover_text("PSNR on pairs left out of the fit");
+        }
     });
 }
 

@@ -145,6 +145,12 @@ const FIGURES: [FitColumn; 3] = [
     }),
 ];
 
+/// The gain of a fit in one number, on pairs that were left out.
+pub(super) fn gain(adapted: &Adapted) -> Option<String> {
+    let fitted = adapted.after.as_ref().or(adapted.closed_form.as_ref())?;
+    Some(format!("{:.1} dB, before {:.1} dB", fitted.psnr_db?, adapted.before.psnr_db?))
+}
+
 /// Before and after, on pairs that were left out.
 fn scores(cx: &Cx<'_>, ui: &mut Ui, adapted: &Adapted) {
     ui.label(section("Scores on pairs left out", cx.p));
