@@ -33,7 +33,8 @@ impl Kept {
         let place = dataset.root.as_ref().map_or_else(|| dataset.title.clone(), |root| root.display().to_string());
         let mut decides = format!("{} {:?}", env!("CARGO_PKG_VERSION"), dataset.read_as()).into_bytes();
         decides.extend(serde_json::to_vec(setup).unwrap_or_default());
-        for bundle in setup.bundles.iter().chain(&setup.classifier) {
+        let mask_model = setup.recipe.mask_model.as_ref().map(|model| &model.origin);
+        for bundle in setup.bundles.iter().chain(&setup.classifier).chain(mask_model) {
             decides.extend(&*bundle.file(MANIFEST).read(files::SMALL).unwrap_or_default());
         }
         let pairs = (0..dataset.index.pairs.len() as u32).flat_map(|pair| dataset.pair_files(PairId(pair)));
