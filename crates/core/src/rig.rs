@@ -32,7 +32,7 @@ pub struct Rig {
     /// Windows: where one sensor's view lies in another's.
     #[serde(default)]
     pub windows: Vec<Window>,
-    /// How well the places of the depth cameras are known.
+    /// Tolerance of the depth cameras' poses.
     #[serde(default)]
     pub camera_tolerance: CameraTolerance,
 }

@@ -22,7 +22,7 @@ const SURE: f64 = 0.95;
 pub struct Candidate {
     /// Name of the tool.
     pub tool: String,
-    /// Its model, x from the middle between the sides that the fingers hold.
+    /// CAD model of it, x from the middle between the sides that the fingers hold.
     pub mesh: Arc<TriMesh>,
     /// Answer of the registration of its model, with the evidence.
     pub report: AlignReport,

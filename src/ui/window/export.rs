@@ -183,7 +183,7 @@ pub(crate) fn import_form(cx: &mut Cx<'_>, ctx: &egui::Context) {
     }
 }
 
-/// What would be done, line by line, or that it is `nothing`; true where there is something to do.
+/// Plan, line by line, or that it is `nothing`; true where there is something to do.
 fn plan<T>(
     cx: &Cx<'_>,
     ui: &mut Ui,

@@ -19,12 +19,12 @@ pub struct PadImage<'a> {
     pub camera: &'a DepthCamera,
     /// True where a model predicted it. Such an image has no pixel noise: its errors are of shape, wider than the finest band.
     pub predicted: bool,
-    /// How well the camera's place is known.
+    /// Tolerance of the camera's pose.
     pub tolerance: CameraTolerance,
 }
 
 impl<'a> PadImage<'a> {
-    /// What a camera in a good mount measured.
+    /// Measurement of a camera in a good mount.
     pub fn measured(imprint: &'a DepthMap, camera: &'a DepthCamera) -> Self {
         Self { imprint, camera, predicted: false, tolerance: CameraTolerance::default() }
     }
@@ -76,7 +76,7 @@ impl<'a> Scene<'a> {
         self.contacts.points
     }
 
-    /// How well the places of its cameras are known.
+    /// Tolerance of its cameras' poses.
     pub(super) fn tolerance(&self) -> CameraTolerance {
         self.images().first().map(|image| image.tolerance).unwrap_or_default()
     }

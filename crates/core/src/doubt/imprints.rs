@@ -232,12 +232,17 @@ fn figures(pairs: &Pairs<'_>, stored: &[f64], read_as: ReadAs, gain: &Gain) -> S
 
 /// The tools whose pairs do not lie on their CAD models, with their mean likeness.
 fn tools_in_doubt<'a>(pairs: &Pairs<'a>, stored: &[f64]) -> Vec<(&'a str, f64)> {
+    means(pairs, stored).into_iter().filter(|(_, mean)| *mean < GOOD).collect()
+}
+
+/// Mean likeness of the pairs of each tool.
+fn means<'a>(pairs: &Pairs<'a>, stored: &[f64]) -> Vec<(&'a str, f64)> {
     let mut by_tool: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
     for (tool, score) in pairs.tools.iter().zip(stored) {
         by_tool.entry(tool).or_default().push(*score);
     }
     let mean = |(tool, scores): (_, Vec<f64>)| (tool, scores.iter().sum::<f64>() / scores.len() as f64);
-    by_tool.into_iter().map(mean).filter(|(_, mean)| *mean < GOOD).collect()
+    by_tool.into_iter().map(mean).collect()
 }
 
 /// Other CAD models, or the same with other axes, where they explain the tools in doubt; with the mean likeness of all pairs
@@ -248,8 +253,11 @@ fn of_models(
     doubted: &[(&str, f64)],
     stored: &[f64],
 ) -> Option<(Doubt, f64)> {
+    if doubted.is_empty() {
+        return None;
+    }
     let others = other_models(pairs, doubted);
-    let turned = other_axes(pairs, meshes, doubted);
+    let turned = other_axes(pairs, meshes, doubted, &means(pairs, stored));
     let explained = |tools: &[(&str, f64)]| {
         let gained: f64 =
             tools.iter().map(|(tool, gain)| gain * pairs.tools.iter().filter(|t| *t == tool).count() as f64).sum();
@@ -349,10 +357,8 @@ fn other_axes<'a>(
     pairs: &Pairs<'a>,
     meshes: &BTreeMap<String, TriMesh>,
     doubted: &[(&'a str, f64)],
+    stored: &[(&'a str, f64)],
 ) -> Option<OtherAxes<'a>> {
-    let tools: BTreeSet<&str> = pairs.tools.iter().copied().collect();
-    let stored: Vec<(&str, f64)> =
-        tools.into_iter().map(|tool| (tool, pairs.of_tool(tool, &pairs.fields[tool]))).collect();
     let of = |axes: Axes| {
         let score = |tool: &str| {
             let field = meshes.get(tool).and_then(|mesh| DistanceField::from_mesh(&axes.apply(mesh)).ok());

@@ -132,7 +132,7 @@ pub struct Dataset {
     cameras: OnceLock<PerPad<Arc<DepthCamera>>>,
     /// The units of CAD models that were named for this run only, by tool.
     held_units: Arc<Mutex<BTreeMap<String, ToolUnit>>>,
-    /// Whether the poses that the lab's files give lie in the lab's grid; looked up when first needed.
+    /// True where the poses that the lab's files give lie in the lab's grid; looked up when first needed.
     in_lab_grid: OnceLock<bool>,
 }
 

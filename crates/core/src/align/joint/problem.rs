@@ -104,6 +104,7 @@ pub(super) struct Problem<'a> {
     pub(super) predicted: bool,
     /// True where the tool is looked for beyond the prior.
     wide: bool,
+    /// Tolerance of the cameras' poses.
     pub(super) tolerance: CameraTolerance,
 }
 
