@@ -233,9 +233,8 @@ fn write_spoilt(root: &Path, number: u64, spoil: impl Fn(&mut touch2touch_core::
     use touch2touch_core::catalog;
     use touch2touch_core::sim;
     use touch2touch_pipeline::io::simulated::{Layout, write_pair, write_tools};
-    let tool = &catalog::tools()[0];
-    let grasp = sim::Grasp { theta_rad: 0.2, x_m: 0.001, y_m: -0.001 };
-    let mut sample = sim::simulate(tool, grasp, 7, &sim::SimConfig::default());
+    let tool = &catalog::tools()[3];
+    let mut sample = sim::simulate(tool, sim::random_grasp(number), 7 + number, &sim::SimConfig::default());
     for touch in sample.pads.iter_mut().flatten() {
         spoil(touch.depth_mut().unwrap());
     }

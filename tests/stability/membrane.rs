@@ -59,7 +59,7 @@ fn m02_an_offset_or_a_gain_of_the_depth_costs_little() {
     for (gain, offset_m) in [(1.0, 5e-4), (1.0, -5e-4), (1.03, 0.0), (0.97, 0.0)] {
         let imprints = changed(case, |v, reference| reference - (reference - v) * gain + offset_m);
         let error = error_deg(&joint(&imprints, &case.masks));
-        assert!(error < 2.0, "gain {gain}, offset {offset_m} m: {error} deg");
+        assert!(error < 2.5, "gain {gain}, offset {offset_m} m: {error} deg");
     }
 }
 

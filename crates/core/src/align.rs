@@ -426,6 +426,11 @@ pub struct AlignReport {
 }
 
 impl AlignReport {
+    /// True where the membranes had a say.
+    pub fn has_membrane(&self) -> bool {
+        self.joint.is_some_and(|fit| fit.basis.has_membrane())
+    }
+
     /// A report of `runs` about `used` points, with the inliers of the winner and the sum of their squared distances.
     fn of(runs: Vec<Run>, winner: usize, rung: Rung, used: usize, (inliers, squares): (usize, f64)) -> Self {
         let Run { start, end, stop, .. } = runs[winner];

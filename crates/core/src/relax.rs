@@ -30,20 +30,8 @@ impl Field {
         top + (bottom - top) * ty
     }
 
-    /// Every second node.
-    pub(crate) fn thinned(&self) -> Field {
-        let (columns, rows) = (self.columns.div_ceil(2), self.rows.div_ceil(2));
-        let mut out = Field::filled(columns, rows, 0.0);
-        for y in 0..rows {
-            for x in 0..columns {
-                out.values[y * columns + x] = self.values[2 * y * self.columns + 2 * x];
-            }
-        }
-        out
-    }
-
     /// Every second node, with the largest value within `reach` nodes of it.
-    fn coarser(&self, reach: usize) -> Field {
+    pub(crate) fn coarser(&self, reach: usize) -> Field {
         let (columns, rows) = (self.columns.div_ceil(2), self.rows.div_ceil(2));
         let mut out = Field::filled(columns, rows, f32::NEG_INFINITY);
         for y in 0..rows {
@@ -79,7 +67,7 @@ pub(crate) struct Problem<'a> {
 
 impl Problem<'_> {
     /// Solves on `levels` grids, each twice as fine as the one before, with `sweeps` sweeps on the finest and twice
-    /// as many on each coarser one.
+    /// as many on each coarser one; the finest alone has [`Self::more`].
     pub(crate) fn solve(&self, levels: usize, sweeps: usize) -> Field {
         self.solve_from(levels, sweeps, 0)
     }
@@ -89,24 +77,32 @@ impl Problem<'_> {
     fn solve_from(&self, levels: usize, sweeps: usize, reach: usize) -> Field {
         let mut start = if levels > 1 && self.obstacle.columns > 8 && self.obstacle.rows > 8 {
             let (obstacle, free) = self.coarser(reach);
-            let more = self.more.map(Field::thinned);
-            let coarse =
-                Problem { obstacle: &obstacle, free: &free, more: more.as_ref(), step: 2.0 * self.step, ..*self };
+            let coarse = Problem { obstacle: &obstacle, free: &free, more: None, step: 2.0 * self.step, ..*self };
             let w = coarse.solve_from(levels - 1, 2 * sweeps, 1);
-            let mut fine = Field::filled(self.obstacle.columns, self.obstacle.rows, 0.0);
-            for y in 0..fine.rows {
-                for x in 0..fine.columns {
-                    if self.free[y * fine.columns + x] {
-                        fine.values[y * fine.columns + x] = w.at(x as f64 * 0.5, y as f64 * 0.5) as f32;
-                    }
-                }
-            }
-            fine
+            self.refined(&w)
         } else {
             Field::filled(self.obstacle.columns, self.obstacle.rows, 0.0)
         };
         self.relax(&mut start, sweeps);
         start
+    }
+
+    /// A field on the grid of twice the spacing at this one's free nodes, 0 at the others.
+    pub(crate) fn refined(&self, coarse: &Field) -> Field {
+        let mut fine = Field::filled(self.obstacle.columns, self.obstacle.rows, 0.0);
+        let mut between = vec![0.0; coarse.columns + 1];
+        for (y, to) in fine.values.chunks_exact_mut(self.obstacle.columns).enumerate() {
+            let row = |y: usize| &coarse.values[y.min(coarse.rows - 1) * coarse.columns..][..coarse.columns];
+            for ((between, above), below) in between.iter_mut().zip(row(y / 2)).zip(row(y.div_ceil(2))) {
+                *between = 0.5 * (above + below);
+            }
+            between[coarse.columns] = between[coarse.columns - 1];
+            for (x, (to, free)) in to.iter_mut().zip(&self.free[y * self.obstacle.columns..]).enumerate() {
+                let value = 0.5 * (between[x / 2] + between[x.div_ceil(2)]);
+                *to = if *free { value } else { 0.0 };
+            }
+        }
+        fine
     }
 
     /// Obstacle and free nodes on a grid of twice the spacing.
@@ -122,36 +118,78 @@ impl Problem<'_> {
 
     /// `sweeps` red-black sweeps in place.
     pub(crate) fn relax(&self, w: &mut Field, sweeps: usize) {
-        let columns = w.columns;
+        let (columns, rows) = (w.columns, w.rows);
         let h2 = self.step * self.step;
         let inverse = 1.0 / (4.0 + self.stiffness * h2);
         let source = self.load * h2;
-        let none = vec![0.0; columns];
+        let movable =
+            |x: usize, y: usize| self.free[y * columns + x] && x > 0 && x + 1 < columns && y > 0 && y + 1 < rows;
+        let mut sheet = Halves::of(columns, rows, 0.0, |x, y| w.values[y * columns + x]);
+        let moves = Halves::of(columns, rows, 0.0, |x, y| f32::from(u8::from(movable(x, y))));
+        let below_all = f32::NEG_INFINITY;
+        let obstacle =
+            |x: usize, y: usize| if movable(x, y) { self.obstacle.values[y * columns + x] } else { below_all };
+        let obstacle = Halves::of(columns, rows, below_all, obstacle);
+        let more =
+            Halves::of(columns, rows, 0.0, |x, y| self.more.map_or(0.0, |more| more.values[y * columns + x] * h2));
+        let width = sheet.width;
         for sweep in 0..sweeps {
             // over-relaxation from the second sweep on; a last plain one smooths
             let omega = if sweep == 0 || sweep + 1 == sweeps { 1.0 } else { 1.75 };
             for color in 0..2 {
-                for y in 1..w.rows - 1 {
-                    let row = y * columns;
-                    let first = 1 + (y + color) % 2;
-                    let (above, rest) = w.values[row - columns..].split_at_mut(columns);
-                    let (here, below) = rest.split_at_mut(columns);
-                    let below = &below[..columns];
-                    let obstacle = &self.obstacle.values[row..row + columns];
-                    let free = &self.free[row..row + columns];
-                    let more = self.more.map_or(&none[..], |more| &more.values[row..row + columns]);
-                    let mut x = first;
-                    while x + 1 < columns {
-                        if free[x] {
-                            let sum = here[x - 1] + here[x + 1] + above[x] + below[x];
-                            let target = (sum + source + more[x] * h2) * inverse;
-                            here[x] = (here[x] + omega * (target - here[x])).max(obstacle[x]);
-                        }
-                        x += 2;
+                for y in 1..rows - 1 {
+                    let odd = (y + color) % 2 == 0;
+                    let [even_half, odd_half] = &mut sheet.halves;
+                    let (own, other) = if odd { (odd_half, even_half) } else { (even_half, odd_half) };
+                    let row = y * width;
+                    let (before, rest) = own[row - width..].split_at_mut(width);
+                    let (here, after) = rest.split_at_mut(width);
+                    // Of an odd node the neighbors in the row are the even ones at its index and the next.
+                    let first = usize::from(!odd);
+                    let count = width - 1;
+                    let here = &mut here[first..][..count];
+                    let (above, below) = (&before[first..][..count], &after[first..][..count]);
+                    let (left, right) = (&other[row..][..count], &other[row + 1..][..count]);
+                    let half = usize::from(odd);
+                    let more = &more.halves[half][row + first..][..count];
+                    let moves = &moves.halves[half][row + first..][..count];
+                    let obstacle = &obstacle.halves[half][row + first..][..count];
+                    for i in 0..count {
+                        let target = (left[i] + right[i] + above[i] + below[i] + source + more[i]) * inverse;
+                        let moved = here[i] + moves[i] * (omega * (target - here[i]));
+                        here[i] = if moved > obstacle[i] { moved } else { obstacle[i] };
                     }
                 }
             }
         }
+        for y in 0..rows {
+            for x in 0..columns {
+                w.values[y * columns + x] = sheet.halves[x % 2][y * width + x / 2];
+            }
+        }
+    }
+}
+
+/// The even and the odd nodes of each row of a grid apart, so that neighbors of one color lie side by side.
+struct Halves {
+    halves: [Vec<f32>; 2],
+    /// Length of a row: one more than there are even nodes.
+    width: usize,
+}
+
+impl Halves {
+    fn of(columns: usize, rows: usize, beyond: f32, at: impl Fn(usize, usize) -> f32) -> Self {
+        let width = columns.div_ceil(2) + 1;
+        let halves = [0, 1].map(|half| {
+            let mut values = vec![beyond; width * rows];
+            for y in 0..rows {
+                for (value, x) in values[y * width..].iter_mut().zip((half..columns).step_by(2)) {
+                    *value = at(x, y);
+                }
+            }
+            values
+        });
+        Self { halves, width }
     }
 }
 

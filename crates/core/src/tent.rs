@@ -1,15 +1,14 @@
 //! The shape of a membrane that is pressed onto a tool, on a grid over the y-z plane of the object frame.
 //!
 //! [`heights`] is the tool's top over the middle plane, seen along the closing axis. A membrane over it is the smallest sheet
-//! that bends nowhere more than the free membrane does: the solution of an obstacle problem (an upper envelope). It depends on
-//! the tool and the free membrane alone, so it is made once, and what a membrane looks like at a pose is a look-up.
+//! that bends nowhere more than the free membrane does: the solution of an obstacle problem (an upper envelope).
 //!
 //! A membrane that reaches the middle plane when nothing is held stands as a [`tent`] on that plane, where the other finger's
-//! membrane begins. One that does not, as the lab's, hangs in facets from crest to crest and leads on to its rim: it is
-//! [`lifted`] from its free shape.
+//! membrane begins: it depends on the tool alone. One that does not, as the lab's, hangs in facets from crest to crest and leads
+//! on to its rim: it is [`lifted`] from its free shape, and depends, little, on the pose of the tool under it. Made for one pose
+//! it is looked up at those about it.
 //!
-//! Left out: the free membrane moves with the hand and not with the tool, which lengths of some millimeters do not show; the
-//! rim's true outline, growing tension, and the air that the tool displaces.
+//! Left out: the rim's true outline, growing tension, and the air that the tool displaces.
 
 use glam::DVec2;
 
@@ -26,14 +25,14 @@ const HIGHEST_M: f64 = 0.05;
 /// Grids of the solver, and sweeps on the finest. The error is below 0.1 mm (tested against many sweeps).
 const LEVELS: usize = 5;
 const SWEEPS: usize = 16;
-/// Radius at which a membrane hangs from its free shape, meters. It matters little: 55 mm give the same poses.
-const RIM_M: f64 = 0.065;
-/// Times that the curvature is corrected for the slopes it led to.
-const BENDINGS: usize = 2;
+/// Radius at which a membrane hangs from its free shape, meters. It matters little: 75 mm give the same poses.
+const RIM_M: f64 = 0.055;
+/// Least nodes along a side of what is solved, where the rim lies beyond the tool's grid.
+const MIN_NODES: f64 = 16.0;
 /// Steeper sheets bend no more: near vertical one would hang over, which a height cannot say.
 const STEEPEST: f32 = 1.6;
 /// Bending of the membrane during a touch over that of the free one: the pressure rises.
-const PRESSED: f64 = 1.15;
+const PRESSED: f32 = 1.15;
 
 /// Heights over the middle plane, meters, on a grid.
 #[derive(Clone, Debug)]
@@ -49,7 +48,7 @@ pub(crate) struct Sheet {
 impl Sheet {
     /// Every second node.
     pub(crate) fn thinned(&self) -> Self {
-        Self { field: self.field.thinned(), step_m: 2.0 * self.step_m, ..*self }
+        Self { field: self.field.coarser(0), step_m: 2.0 * self.step_m, ..*self }
     }
 }
 
@@ -124,63 +123,80 @@ pub(crate) struct FreeShape {
 }
 
 impl FreeShape {
-    /// Height over the middle plane at a place of the object frame, meters.
+    /// Height over the middle plane at a place of the grasp frame, meters.
     fn at(&self, yz: DVec2) -> f64 {
-        let yz = self.of.transform_yz(yz);
         self.height_m + self.slope.dot(yz) + 0.5 * self.bend.dot(yz * yz)
     }
 }
 
 /// Height over the free membrane, and over the middle plane where that reaches beyond it, of the smallest sheet over `heights`
-/// and the middle plane that hangs from the free membrane at the rim.
+/// and the middle plane that hangs from the free membrane at the rim. Of the nodes within the rim alone.
 pub(crate) fn lifted(heights: &Sheet, free: &FreeShape) -> Sheet {
-    let (columns, rows) = (heights.field.columns, heights.field.rows);
-    let place = |k: usize| heights.origin + DVec2::new((k % columns) as f64, (k / columns) as f64) * heights.step_m;
-    let dome: Vec<f32> = (0..columns * rows).map(|k| free.at(place(k)) as f32).collect();
-    let within: Vec<bool> = (0..columns * rows).map(|k| free.of.transform_yz(place(k)).length() < RIM_M).collect();
+    let step_m = heights.step_m;
+    let middle = free.of.inverse().transform_yz(DVec2::ZERO);
+    let last = DVec2::new((heights.field.columns - 1) as f64, (heights.field.rows - 1) as f64);
+    let low = ((middle - RIM_M - heights.origin) / step_m).floor().clamp(DVec2::ZERO, last - MIN_NODES);
+    let high = ((middle + RIM_M - heights.origin) / step_m).ceil().clamp(low + MIN_NODES, last);
+    let (columns, rows) = ((high.x - low.x) as usize + 1, (high.y - low.y) as usize + 1);
+    let origin = heights.origin + low * step_m;
+    let (across, first) = (DVec2::from_angle(free.of.theta_rad) * step_m, free.of.transform_yz(origin));
     let mut obstacle = Field::filled(columns, rows, f32::NEG_INFINITY);
-    for k in (0..columns * rows).filter(|k| within[*k]) {
-        obstacle.values[k] = heights.field.values[k] - dome[k];
+    let (mut dome, mut within) = (Field::filled(columns, rows, 0.0), vec![false; columns * rows]);
+    for row in 0..rows {
+        let first = first + across.perp() * row as f64;
+        let tops = &heights.field.values[(low.y as usize + row) * heights.field.columns + low.x as usize..][..columns];
+        for (column, top) in tops.iter().enumerate() {
+            let (k, place) = (row * columns + column, first + across * column as f64);
+            dome.values[k] = free.at(place) as f32;
+            within[k] = place.length_squared() < RIM_M * RIM_M;
+            if within[k] {
+                obstacle.values[k] = top - dome.values[k];
+            }
+        }
     }
     // About the free membrane the sheet bends by the rest.
-    let load = ((1.0 - PRESSED) * (free.bend.x + free.bend.y)) as f32;
-    let problem =
-        Problem { obstacle: &obstacle, free: &within, load, more: None, stiffness: 0.0, step: heights.step_m as f32 };
-    let mut field = problem.solve(LEVELS, SWEEPS);
-    for (k, lifted) in field.values.iter_mut().enumerate() {
-        *lifted = if within[k] { *lifted + dome[k].min(0.0) } else { 0.0 };
+    let bend = (free.bend.x + free.bend.y) as f32;
+    let load = (1.0 - PRESSED) * bend;
+    let problem = Problem { obstacle: &obstacle, free: &within, load, more: None, stiffness: 0.0, step: step_m as f32 };
+    let mut field = solved(&problem, &dome, -PRESSED * bend);
+    for ((lifted, dome), within) in field.values.iter_mut().zip(&dome.values).zip(&within) {
+        *lifted = if *within { *lifted + dome.min(0.0) } else { 0.0 };
     }
-    Sheet { field, ..*heights }
+    Sheet { field, origin, step_m }
 }
 
 /// The smallest sheet over `heights` that touches the middle plane elsewhere and bends by at most `curvature` (the
 /// Laplacian of the free membrane's height, 1/m).
-///
-/// A sheet under pressure bends by that where it is flat and by `(1 + slope^2)^1.5` times as much where it is steep.
 pub(crate) fn tent(heights: &Sheet, curvature: f64) -> Sheet {
-    let obstacle = &heights.field;
+    let (obstacle, load) = (&heights.field, -curvature as f32);
     let free = vec![true; obstacle.values.len()];
-    let load = -curvature as f32;
-    let plain = Problem { obstacle, free: &free, load, more: None, stiffness: 0.0, step: STEP_M as f32 };
-    let mut field = plain.solve(LEVELS, SWEEPS);
-    for _ in 0..BENDINGS {
-        let more = bending(&field, load);
-        let bent = Problem { more: Some(&more), ..plain };
-        bent.relax(&mut field, SWEEPS);
-    }
-    Sheet { field, ..*heights }
+    let problem = Problem { obstacle, free: &free, load, more: None, stiffness: 0.0, step: heights.step_m as f32 };
+    let plane = Field::filled(obstacle.columns, obstacle.rows, 0.0);
+    Sheet { field: solved(&problem, &plane, load), ..*heights }
 }
 
-/// Addition of a sheet's slopes to its load.
-fn bending(sheet: &Field, load: f32) -> Field {
-    let (columns, rows) = (sheet.columns, sheet.rows);
+/// The solution of a problem about a dome, with the pressure's whole load where the sheet is steep.
+fn solved(fine: &Problem<'_>, dome: &Field, pressure: f32) -> Field {
+    let (obstacle, free) = fine.coarser(0);
+    let coarse = Problem { obstacle: &obstacle, free: &free, step: 2.0 * fine.step, ..*fine };
+    let mut field = coarse.solve(LEVELS - 1, 2 * SWEEPS);
+    let more = steepened(&field, &dome.coarser(0), pressure, coarse.step);
+    Problem { more: Some(&more), ..coarse }.relax(&mut field, SWEEPS);
+    let (mut field, more) = (fine.refined(&field), fine.refined(&more));
+    Problem { more: Some(&more), ..*fine }.relax(&mut field, SWEEPS);
+    field
+}
+
+/// Addition to the load of a sheet, lifted over a dome, where it is steep: a sheet under pressure bends by that where it is flat
+/// and by `(1 + slope^2)^1.5` times as much where it is steep.
+fn steepened(lifted: &Field, dome: &Field, load: f32, step: f32) -> Field {
+    let (columns, rows) = (lifted.columns, lifted.rows);
+    let height = |k: usize| lifted.values[k] + dome.values[k];
     let mut more = Field::filled(columns, rows, 0.0);
-    let scale = 0.5 / STEP_M as f32;
-    for row in 1..rows.saturating_sub(1) {
+    for row in 1..rows - 1 {
         for k in row * columns + 1..(row + 1) * columns - 1 {
-            let w = &sheet.values;
-            let (y, z) = ((w[k + 1] - w[k - 1]) * scale, (w[k + columns] - w[k - columns]) * scale);
-            let square = (y * y + z * z).min(STEEPEST * STEEPEST);
+            let (y, z) = (height(k + 1) - height(k - 1), height(k + columns) - height(k - columns));
+            let square = ((y * y + z * z) / (4.0 * step * step)).min(STEEPEST * STEEPEST);
             more.values[k] = load * ((1.0 + square) * (1.0 + square).sqrt() - 1.0);
         }
     }
@@ -217,7 +233,11 @@ mod tests {
         let (height, curvature) = (5e-4, 20.0);
         let wall = cuboid(DVec3::ZERO, DVec3::new(height, 0.004, 0.06));
         // Pressed far beyond the middle plane.
-        let free = FreeShape { height_m: -0.03, bend: DVec2::splat(0.5 * curvature / PRESSED), ..FreeShape::default() };
+        let free = FreeShape {
+            height_m: -0.03,
+            bend: DVec2::splat(0.5 * curvature / f64::from(PRESSED)),
+            ..FreeShape::default()
+        };
         let sheet = lifted(&heights(&wall, 1.0).unwrap(), &free);
         let reach = (2.0 * height / curvature).sqrt();
         let row = ((0.0 - sheet.origin.y) / STEP_M).round() as usize;

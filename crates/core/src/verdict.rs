@@ -259,7 +259,7 @@ fn signs(report: &AlignReport, evidence: &Evidence, place_m: f64) -> Vec<Sign> {
         let angle = Grade::of(membrane.own.angle_rad, APART_RAD).min(gain);
         sign(Elsewhere, [angle, gain.min(worst_place)], what);
         let (unlike, off_tool) = (1.0 - membrane.likeness, off.min(OFF_CAP));
-        let by_membrane = report.joint.is_some_and(|fit| fit.basis.has_membrane());
+        let by_membrane = report.has_membrane();
         let grade = if by_membrane && !Prior::default().allows(report.grasp_from_object) {
             Grade::of(unlike + ANYWHERE_OFF * off_tool + ANYWHERE_ELSEWHERE * membrane.own.gain, ANYWHERE)
         } else {

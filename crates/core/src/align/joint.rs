@@ -29,7 +29,7 @@ use crate::frames::PlanarPose;
 use crate::tool::ToolModel;
 pub use answers::PoseAnswer;
 pub use evidence::{Elsewhere, Evidence, MembraneEvidence};
-use problem::Problem;
+use problem::{Answer, Problem};
 
 /// Share of the membrane's relief below which the membrane alone is asked as well, and answers if it explains more.
 const DOUBTFUL: f64 = 0.3;
@@ -104,41 +104,20 @@ impl JointConfig {
         Prior::default().allows(pose) || self.range.prior().allows(pose)
     }
 
-    /// The answer in the prior, and whether it stands: then nobody looks farther. Where the mask alone answers, it goes up these
-    /// rungs.
-    fn in_prior(self, scene: &Scene<'_>, tool: &ToolModel, ask: Ask<'_>, rungs: &[Rung]) -> (Found, bool) {
-        let by_mask = |fit: JointFit| -> Found {
-            let report = AlignConfig { rungs: rungs.to_vec(), ..AlignConfig::default() }.run(scene, tool, ask)?;
-            let within_prior = report.within_prior || self.allows(report.grasp_from_object);
-            Ok(AlignReport { joint: Some(fit), range: self.range, within_prior, ..report })
-        };
-        if scene.images().is_empty() {
-            return (by_mask(JointFit::by_mask(Basis::NoImage)), true);
-        }
-        let mut problem = match Problem::new(scene, tool, self, ask, false) {
-            Ok(Some(problem)) => problem,
-            Ok(None) => return (by_mask(JointFit::by_mask(Basis::NoZone)), false),
-            Err(error) => return (Err(error), true),
-        };
-        if let Some(starts) = ask.starts {
-            // Asked is where these lead, not what else would answer.
-            let finite = scene.yz().iter().copied().filter(|p| p.is_finite());
-            let overlap = finite.clone().next().map_or(Ok(()), |_| check_overlap(finite, &tool.field, starts));
-            return (overlap.map(|()| problem.report(scene.yz(), problem.solve())), true);
-        }
+    /// The answer in the prior, or why the mask alone answers.
+    fn in_prior(problem: &mut Problem<'_>) -> Result<Answer, JointFit> {
         let mut answer = problem.solve();
         if problem.predicted && answer.fit.explained < PREDICTED_EXPLAINED {
-            return (by_mask(JointFit { basis: Basis::Unlike, mask_weight: 1.0, ..answer.fit }), false);
+            return Err(JointFit { basis: Basis::Unlike, mask_weight: 1.0, ..answer.fit });
         }
         if answer.fit.explained < DOUBTFUL {
             // A bad mask can lead all scouts away from what the membrane shows plainly.
             answer = problem.solve_without_mask(&answer, EXPLAINED).unwrap_or(answer);
         }
         if answer.fit.explained < EXPLAINED {
-            return (by_mask(JointFit { basis: Basis::LittleContact, mask_weight: 1.0, ..answer.fit }), false);
+            return Err(JointFit { basis: Basis::LittleContact, mask_weight: 1.0, ..answer.fit });
         }
-        let stands = problem.stands(&answer);
-        (Ok(problem.report(scene.yz(), answer)), stands)
+        Ok(answer)
     }
 }
 
@@ -151,16 +130,37 @@ impl Register for JointConfig {
             return Err(AlignError::Config { what: "starts" });
         }
         let all = AlignConfig::default().rungs;
-        // The mask's grid and proof take longer than a look around, which mostly leaves nothing to do for them.
-        let quick: &[Rung] = if self.range == Range::LAB || scene.images().is_empty() { &all } else { &all[..2] };
-        let (mut found, stands) = self.in_prior(scene, tool, ask, quick);
-        if stands || self.range == Range::LAB {
-            return found;
+        let by_mask = |fit: JointFit, rungs: &[Rung]| -> Found {
+            let report = AlignConfig { rungs: rungs.to_vec(), ..AlignConfig::default() }.run(scene, tool, ask)?;
+            let within_prior = report.within_prior || self.allows(report.grasp_from_object);
+            Ok(AlignReport { joint: Some(fit), range: self.range, within_prior, ..report })
+        };
+        if scene.images().is_empty() {
+            return by_mask(JointFit::by_mask(Basis::NoImage), &all);
         }
-        if let Some(problem) = Problem::new(scene, tool, *self, ask, true)? {
-            found = problem.look_around(scene.yz(), found);
+        let Some(mut problem) = Problem::new(scene, tool, *self, ask)? else {
+            return by_mask(JointFit::by_mask(Basis::NoZone), &all);
+        };
+        if let Some(starts) = ask.starts {
+            // Asked is where these lead, not what else would answer.
+            let mut finite = scene.yz().iter().copied().filter(|p| p.is_finite()).peekable();
+            if finite.peek().is_some() {
+                check_overlap(finite, &tool.field, starts)?;
+            }
+            return Ok(problem.report(scene.yz(), problem.solve()));
         }
-        let by_mask = |report: &AlignReport| report.joint.is_some_and(|fit| !fit.basis.has_membrane());
-        if found.as_ref().map_or(true, by_mask) { self.in_prior(scene, tool, ask, &all).0 } else { found }
+        match Self::in_prior(&mut problem) {
+            Ok(answer) => {
+                let stands = self.range == Range::LAB || problem.stands(&answer);
+                let found = Ok(problem.report(scene.yz(), answer));
+                if stands { found } else { problem.look_around(scene.yz(), found) }
+            }
+            Err(fit) if self.range == Range::LAB => by_mask(fit, &all),
+            Err(fit) => {
+                // The mask's grid and proof take longer than a look around, which mostly leaves nothing to do for them.
+                let found = problem.look_around(scene.yz(), by_mask(fit, &all[..2]));
+                if found.as_ref().is_ok_and(AlignReport::has_membrane) { found } else { by_mask(fit, &all) }
+            }
+        }
     }
 }

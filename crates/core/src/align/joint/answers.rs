@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::cost::Joint;
 use super::problem::{KERNELS_M, LAST, POINTS, Problem, alike};
+use super::smooth::DECIDING;
 use crate::align::batch::State;
 use crate::align::search::Cost as _;
 use crate::align::{AlignReport, Range};
@@ -12,7 +13,7 @@ use crate::symmetry::Symmetry;
 use crate::units::angle_error;
 
 /// Share of the difference of costs that counts: model errors make costs differ by more than noise does. From fresh grasps.
-const COUNTS: f64 = 0.12;
+const COUNTS: f64 = 0.05;
 /// Least weight of an answer that is told.
 const LEAST: f64 = 0.1;
 /// Ends at most this far apart are one: radians, meters. Farther ones are where the cost between them is hardly higher, as a
@@ -67,7 +68,7 @@ impl Problem<'_> {
         if !least.is_finite() {
             return shared(vec![(report.grasp_from_object, 1.0)], symmetry, report.range);
         }
-        let telling = self.telling(&self.patches_at(self.answer_band(), POINTS[LAST], own), own);
+        let telling = self.telling(&self.patches_at(DECIDING, POINTS[LAST], own), own);
         let chance = |cost: f64| (-0.5 * COUNTS * telling * (cost - least)).exp();
         let sum: f64 = distinct.iter().map(|(_, cost)| chance(*cost)).sum();
         distinct[1..].sort_by(|a, b| a.1.total_cmp(&b.1));
@@ -90,10 +91,9 @@ impl Problem<'_> {
 
     /// True where the cost half way between two states of about one angle is hardly higher than at the dearer one.
     fn slides(&self, a: State, b: State) -> bool {
-        let band = self.answer_band();
         let middle = State { phi: a.phi, place: 0.5 * (a.place + b.place) };
         let [from, half, to] = [a, middle, b].map(|at| {
-            let fingers = self.patches_at(band, POINTS[LAST - 1], at);
+            let fingers = self.patches_at(DECIDING, POINTS[LAST - 1], at);
             Joint { fingers: &fingers, kernel_m: KERNELS_M[LAST], mask: None, lookups: 0 }.sums(at).cost
         });
         half <= from.max(to) * (1.0 + VALLEY)

@@ -26,7 +26,7 @@ const LOOK: Look = Look { band: 1, kernel_m: 1e-3, places: 800 };
 const DESCENT: [Look; 3] = [
     Look { band: 0, kernel_m: 4e-3, places: 200 },
     Look { band: 1, kernel_m: 1e-3, places: 300 },
-    Look { band: 2, kernel_m: 0.5e-3, places: 600 },
+    Look { band: 1, kernel_m: 0.5e-3, places: 600 },
 ];
 const STEPS: usize = 20;
 /// Step that moves no point by more than about this ends a descent, meters.
@@ -105,14 +105,9 @@ impl Evidence {
             .filter(|&&i| tool.field.sample(object_from_grasp.transform_yz(*finite[i])).distance <= ON_TOOL_M);
         let on_tool = on.count() as f64 / chosen.len().max(1) as f64;
         let config = JointConfig { range: report.range };
-        let problem = |wide| Problem::new(scene, tool, config, Ask::default(), wide).ok().flatten();
-        // A pose in the prior is judged with the templates that its ladder registered it with: those of turned grasps fit
-        // worse. Answers are weighed all with those of turned grasps.
-        let beyond = !Prior::default().allows(pose);
-        let among_all = (!beyond && !report.ends.is_empty()).then(|| problem(true)).flatten();
-        let problem = problem(beyond);
+        let problem = Problem::new(scene, tool, config, Ask::default()).ok().flatten();
         let found = problem.as_ref().map(|problem| problem.evidence(scene, State::from_pose(pose, problem.centroid())));
-        let by_membrane = report.joint.is_some_and(|fit| fit.basis.has_membrane());
+        let by_membrane = report.has_membrane();
         let of_mask = || Uncertainty::of_mask(scene.yz(), &tool.field, pose, scene.tolerance());
         let uncertainty = match (&problem, found) {
             (Some(problem), Some((_, own))) => {
@@ -123,7 +118,7 @@ impl Evidence {
             _ => of_mask(),
         };
         let membrane = found.map(|(evidence, _)| evidence);
-        let answers = match among_all.as_ref().or(problem.as_ref()) {
+        let answers = match &problem {
             _ if report.range == Range::LAB => Vec::new(),
             Some(problem) if by_membrane => problem.answers(report, &Symmetry::of(tool)),
             _ => shared(vec![(pose, 1.0)], &Symmetry::of(tool), report.range),
@@ -149,8 +144,7 @@ impl Problem<'_> {
             .filter(|finger| finger[0].1.len() > 0)
             .map(|finger| Relief::of(finger, at, LOOK.kernel_m).likeness())
             .fold(1.0, f64::min);
-        let descent =
-            DESCENT.map(|look| (self.patches_at(look.band.min(self.answer_band()), look.places, at), look.kernel_m));
+        let descent = DESCENT.map(|look| (self.patches_at(look.band, look.places, at), look.kernel_m));
         let all = 0..descent[0].0.len();
         let (own, gain) = descend(&descent, all.clone(), at);
         let alone: Vec<(State, f64)> = all.map(|finger| descend(&descent, finger..finger + 1, own)).collect();
@@ -173,10 +167,9 @@ impl Problem<'_> {
         }
         let images = [PadImage { camera: a.camera, ..*b }, PadImage { camera: b.camera, ..*a }];
         let scene = Scene::new(Contacts { points: &[], images: &images });
-        let beyond = !Prior::default().allows(at.to_pose(self.centroid()));
-        let swapped = Problem::new(&scene, self.tool, self.config, Ask::default(), beyond).ok()??;
+        let swapped = Problem::new(&scene, self.tool, self.config, Ask::default()).ok()??;
         let mut found = Ok(swapped.report(&[], swapped.solve()));
-        if beyond {
+        if !Prior::default().allows(at.to_pose(self.centroid())) {
             found = swapped.look_around(&[], found);
         }
         let end = State::from_pose(found.ok()?.grasp_from_object, swapped.centroid());

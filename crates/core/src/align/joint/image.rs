@@ -14,11 +14,8 @@ use crate::tent::FreeShape;
 /// tool's height above it: one that reaches the middle plane is the template's plane only there, and one that hangs over it falls
 /// off to the rim, whatever the tool.
 const ZONE_M: f32 = 0.5e-3;
-const ZONE_SHARE: f64 = 0.2;
+const ZONE_SHARE: f64 = 0.4;
 const HANGING_ZONE_SHARE: f64 = 0.65;
-/// The share for one that reaches the middle plane where the tool is looked for beyond the lab's grasps: more of it has to lie in
-/// the zone of a grasp that is off the middle.
-const WIDE_ZONE_SHARE: f64 = 0.4;
 /// A free membrane whose lowest part is nearer to the middle plane reaches it, meters.
 const REACHES_M: f64 = 1e-3;
 /// Heights beyond these are no membrane of a closed gripper, meters.
@@ -103,15 +100,11 @@ struct Zone {
 }
 
 impl Zone {
-    fn new(image: &PadImage<'_>, rays: &Rays, top_m: f64, wide: bool) -> Option<Self> {
+    fn new(image: &PadImage<'_>, rays: &Rays, top_m: f64) -> Option<Self> {
         let reference = &image.camera.depth_reference;
         let floor_m = floor(image, rays);
         let reaches = f64::from(floor_m) < REACHES_M;
-        let share = match (reaches, wide) {
-            (true, false) => ZONE_SHARE,
-            (true, true) => WIDE_ZONE_SHARE,
-            (false, _) => HANGING_ZONE_SHARE,
-        };
+        let share = if reaches { ZONE_SHARE } else { HANGING_ZONE_SHARE };
         let zone_m = floor_m + ZONE_M.max((share * (top_m - f64::from(floor_m))) as f32);
         let mut spans = vec![[0usize; 2]; reference.height()];
         let mut pixels = 0;
@@ -379,13 +372,13 @@ fn at_nodes(pairs: &[Pair], columns: usize, rows: usize) -> Layer<2> {
 
 impl Image {
     /// `None` where the free membrane lies too far from the tool, or the camera cannot be right.
-    pub(super) fn new(image: &PadImage<'_>, tops_m: [f64; 2], wide: bool) -> Option<Self> {
+    pub(super) fn new(image: &PadImage<'_>, tops_m: [f64; 2]) -> Option<Self> {
         if image.imprint.size() != image.camera.depth_reference.size() || !image.camera.intrinsics.is_plausible() {
             return None;
         }
         let rays = Rays::new(image)?;
         let top_m = tops_m[usize::from(rays.side > 0.0)];
-        let zone = Zone::new(image, &rays, top_m, wide)?;
+        let zone = Zone::new(image, &rays, top_m)?;
         let splat = Splat::new(image, &rays, &zone, top_m);
         let columns = splat.nodes.columns;
         let smooth = Smooth::new(&splat.nodes, STEP_M, STEP_M * STEP_M / 6.0);

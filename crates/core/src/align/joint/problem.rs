@@ -1,6 +1,6 @@
 //! The search for the pose under which templates and silhouette fit the membranes and the mask.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 use std::rc::Rc;
 use std::sync::Arc;
 
@@ -8,8 +8,8 @@ use glam::DVec2;
 
 use super::cost::{Joint, MaskPart, Noted, Patch, Relief, noise_m};
 use super::image::Image;
-use super::smooth::BANDS;
-use super::template::{BandField, Grasp, Template, grasp_of, template};
+use super::smooth::{BANDS, DECIDING};
+use super::template::{BandField, Grasp, Template, template};
 use super::turned::{Frame, Turned, turned};
 use super::{Basis, EXPLAINED, Found, JointConfig, JointFit, PREDICTED_EXPLAINED};
 use crate::align::batch::{Cloud, State};
@@ -29,7 +29,7 @@ use crate::tool::ToolModel;
 /// Smallest area of the membranes that is compared, square meters.
 const MIN_AREA_M2: f64 = 1e-4;
 /// Places of the membranes that are compared in each band, coarse to fine, and for the answer (in the finest).
-pub(super) const POINTS: [usize; LAST + 1] = [100, 150, 400, 1200];
+pub(super) const POINTS: [usize; LAST + 1] = [100, 150, 400, 3000];
 /// Position in [`POINTS`] of what decides the answer.
 pub(super) const LAST: usize = 3;
 /// Widths of the Geman-McClure kernel likewise, meters.
@@ -52,10 +52,9 @@ const PREDICTED_WEIGHT: f64 = 0.3;
 const AGREES: f64 = 0.1;
 /// Costs this close, as a share, do not tell two ends apart.
 const CLOSE: f64 = 0.15;
-/// Share of the membrane's relief that an answer from the prior must explain, or scouts start all around: of a membrane that
-/// hangs from the tool, and of one that reaches the middle plane. Little, because an answer on which the first scouts agree
-/// is hardly ever another pose's.
-const STANDS: [f64; 2] = [0.2, EXPLAINED];
+/// Share of the membrane's relief that an answer from the prior must explain, or scouts start all around. Little, because an
+/// answer on which the first scouts agree is hardly ever another pose's.
+const STANDS: f64 = 0.2;
 /// Share of its cost that another pose must be ahead of it, and where grasps are known to be from the lab's grid.
 const AHEAD: [f64; 2] = [0.03, 0.12];
 /// Most steps in each band.
@@ -74,14 +73,14 @@ const ENDS: usize = 4;
 /// Places of the membranes that they compare in the coarsest band: more than those from the prior, which start nearer.
 const PLACES_AROUND: usize = 200;
 /// Most templates that an end of theirs goes through: where it ends another one may be nearer.
-const SETTLED: usize = 3;
+const SETTLED: usize = 2;
 /// Most steps of scouts that start all around, and of the last descent.
 const STEPS_AROUND: [usize; LAST + 1] = [6, 8, 12, 8];
 
 /// A finger's image and its template.
 struct Finger {
     image: Image,
-    /// The template of the lab's grasps.
+    /// The template of a grasp in the middle.
     template: Arc<Template>,
 }
 
@@ -102,8 +101,6 @@ pub(super) struct Problem<'a> {
     free: FreeShape,
     /// True where a model predicted the images.
     pub(super) predicted: bool,
-    /// True where the tool is looked for beyond the prior.
-    wide: bool,
     /// Tolerance of the cameras' poses.
     pub(super) tolerance: CameraTolerance,
 }
@@ -118,7 +115,7 @@ pub(super) struct Answer {
     pub(super) lookups: usize,
     trace: Vec<TraceStep>,
     points: usize,
-    /// True where scouts met in the best end, in the prior, and none nearly as good lies elsewhere or is the tool turned by a half.
+    /// True where scouts met in the best end, in the prior, and none nearly as good lies elsewhere.
     settled: bool,
 }
 
@@ -128,8 +125,8 @@ pub(super) struct Descents<'p, 'a> {
     patches: [Patches; LAST + 1],
     pub(super) lookups: usize,
     trace: Vec<TraceStep>,
-    /// Compare with the templates of the grasp at hand, rather than of the lab's.
-    pub(super) around: bool,
+    /// Most steps in each band.
+    pub(super) steps: [usize; LAST + 1],
 }
 
 /// Patches of one band with other templates.
@@ -138,14 +135,10 @@ fn under(patches: &Patches, templates: &[Arc<Template>], band: usize) -> Patches
 }
 
 impl Descents<'_, '_> {
-    /// Goes down on one band.
-    pub(super) fn descend(&mut self, run: usize, at: &mut Progress, stage: usize, weight: f64) {
-        // A template for each place is worth its making where the answer is decided.
-        let problem = self.problem;
-        let grasp = if self.around { problem.grasp(at.state, stage == LAST) } else { Grasp::default() };
-        let templates = problem.templates(grasp);
-        let fingers = &under(&self.patches[stage], &templates, stage.min(problem.answer_band()));
-        let steps = if self.around { STEPS_AROUND[stage] } else { STEPS };
+    /// Goes down on one band, with the templates of a grasp.
+    fn descend_on(&mut self, grasp: Grasp, run: usize, at: &mut Progress, stage: usize, weight: f64) {
+        let templates = self.problem.templates(grasp);
+        let fingers = &under(&self.patches[stage], &templates, stage.min(DECIDING));
         let last = usize::from(stage == LAST);
         let mask = self.problem.mask.as_ref().map(|clouds| MaskPart {
             field: &self.problem.tool.field,
@@ -156,16 +149,32 @@ impl Descents<'_, '_> {
         let mut joint = Joint { fingers, kernel_m: KERNELS_M[stage], mask, lookups: 0 };
         let trace = self.problem.ask.record.then_some(&mut self.trace);
         let mut noted = Noted { cost: &mut joint, run, centroid: self.problem.centroid, trace };
-        let sums = minimize(&mut noted, at, steps, STEPS_M[stage]);
+        let sums = minimize(&mut noted, at, self.steps[stage], STEPS_M[stage]);
         (at.cost, at.inliers, at.inlier_squares) = (sums.cost, sums.inliers, sums.inlier_squares);
         self.lookups += joint.lookups;
+    }
+
+    /// Goes down on one band, with the templates of its turn.
+    pub(super) fn descend(&mut self, run: usize, at: &mut Progress, stage: usize, weight: f64) {
+        self.descend_on(self.problem.grasp(at.state, false), run, at, stage, weight);
+    }
+
+    /// The last descent, with the templates of its place, again until it ends where they are of.
+    fn settle(&mut self, run: usize, at: &mut Progress, weight: f64) {
+        for _ in 0..SETTLED {
+            let grasp = self.problem.grasp(at.state, true);
+            self.descend_on(grasp, run, at, LAST, weight);
+            if self.problem.grasp(at.state, true) == grasp {
+                break;
+            }
+        }
     }
 
     /// Share of the membranes' relief that the tool explains at a state, and the noise that it leaves, meters.
     fn told(&self, state: State) -> (f64, f64) {
         let problem = self.problem;
         let templates = problem.templates(problem.grasp(state, true));
-        let fingers = under(&self.patches[LAST], &templates, problem.answer_band());
+        let fingers = under(&self.patches[LAST], &templates, DECIDING);
         let relief = Relief::of(&fingers, state, KERNELS_M[LAST]);
         (relief.explained(), noise_m(relief.residuals_m))
     }
@@ -200,11 +209,10 @@ impl<'a> Problem<'a> {
         tool: &'a ToolModel,
         config: JointConfig,
         ask: Ask<'a>,
-        wide: bool,
     ) -> Result<Option<Self>, AlignError> {
         let finite = tool.mesh.vertices.iter().filter(|v| v.is_finite());
         let tops = finite.fold([0f64; 2], |[low, high], v| [low.max(-v.x), high.max(v.x)]);
-        let images: Vec<Image> = scene.images().iter().filter_map(|image| Image::new(image, tops, wide)).collect();
+        let images: Vec<Image> = scene.images().iter().filter_map(|image| Image::new(image, tops)).collect();
         let area: f64 = images.iter().map(Image::area_m2).sum();
         if area < MIN_AREA_M2 {
             return Ok(None);
@@ -253,7 +261,6 @@ impl<'a> Problem<'a> {
             not_finite,
             predicted,
             free,
-            wide,
         }))
     }
 
@@ -262,32 +269,17 @@ impl<'a> Problem<'a> {
         self.centroid
     }
 
-    /// The answer without the mask, if there is one to leave out and that answer is better by `gain` of what the tool explains;
-    /// it leaves the mask out from then on.
+    /// The answer without the mask, if there is one to leave out and that answer is better by `gain` of what the tool explains.
     pub(super) fn solve_without_mask(&mut self, answer: &Answer, gain: f64) -> Option<Answer> {
         let mask = self.mask.take()?;
         let alone = self.solve();
-        if alone.fit.explained > answer.fit.explained + gain {
-            return Some(alone);
-        }
         self.mask = Some(mask);
-        None
+        (alone.fit.explained > answer.fit.explained + gain).then_some(alone)
     }
 
     /// The images as a stage compares them.
     fn patches(&self, stage: usize) -> Patches {
-        self.patches_of(stage.min(self.answer_band()), POINTS[stage])
-    }
-
-    /// Band that decides the answer: the finest that is not noise. To a membrane that hangs from the tool, and to a predicted one,
-    /// lengths of 0.7 to 2 mm are.
-    pub(super) fn answer_band(&self) -> usize {
-        BANDS.len() - 1 - usize::from(self.predicted || self.hangs())
-    }
-
-    /// True where the free membrane does not reach the middle plane.
-    pub(super) fn hangs(&self) -> bool {
-        !self.free.reaches
+        self.patches_of(stage.min(DECIDING), POINTS[stage])
     }
 
     /// About `points` places of the images in a band.
@@ -316,14 +308,8 @@ impl<'a> Problem<'a> {
         self.fingers.iter().filter_map(of).collect()
     }
 
-    /// The grasp of a state, or that of the lab's where it is one; by its turn alone where the place is not asked for.
-    pub(super) fn grasp(&self, at: State, place: bool) -> Grasp {
-        let pose = at.to_pose(self.centroid);
-        if Prior::default().allows(pose) || !self.wide {
-            return Grasp::default();
-        }
-        let [turn, y, z] = grasp_of(pose);
-        if place { [turn, y, z] } else { [turn, 0, 0] }
+    fn grasp(&self, at: State, placed: bool) -> Grasp {
+        Grasp::of(at.to_pose(self.centroid), placed)
     }
 
     pub(super) fn frame(&self) -> Frame {
@@ -341,7 +327,7 @@ impl<'a> Problem<'a> {
 
     pub(super) fn descents(&self) -> Descents<'_, 'a> {
         let patches = std::array::from_fn(|stage| self.patches(stage));
-        Descents { problem: self, patches, lookups: 0, trace: Vec::new(), around: false }
+        Descents { problem: self, patches, lookups: 0, trace: Vec::new(), steps: [STEPS; LAST + 1] }
     }
 
     /// Two scouts from the middle of the prior, one by the bands and one by the mask; two more, and two more, while the best
@@ -375,7 +361,7 @@ impl<'a> Problem<'a> {
                 runs.iter().partition(|at| alike(&at.state, &best.state));
             let rival = apart.iter().any(|at| at.cost < best.cost * (1.0 + CLOSE));
             if self.allowed(best) && met.len() > 1 && !rival {
-                settled = !self.fits_turned(&mut descents, best.state);
+                settled = true;
                 break order;
             }
             let Some(shares) = more.next() else { break order };
@@ -392,25 +378,6 @@ impl<'a> Problem<'a> {
         Answer { starts, runs, winner, rung, fit, lookups: descents.lookups, trace: descents.trace, points, settled }
     }
 
-    /// True where the tool turned by a half about the contact fits about as well, in a pose that is allowed; not for one that a
-    /// half turn takes to itself.
-    fn fits_turned(&self, descents: &mut Descents<'_, '_>, best: State) -> bool {
-        let state = State { phi: crate::units::wrap_angle(best.phi + PI), ..best };
-        let half = |turn: &PlanarPose| (turn.theta_rad.abs() - PI).abs() < 1e-6;
-        if !self.config.allows(state.to_pose(self.centroid)) || Symmetry::of(self.tool).turns.iter().any(half) {
-            return false;
-        }
-        let steps = descents.trace.len();
-        let (mut turned, mut own) = (Progress::new(state), Progress::new(best));
-        let fits = WORTH.into_iter().enumerate().all(|(stage, worth)| {
-            descents.descend(0, &mut turned, stage, SCOUTS_WEIGHT);
-            descents.descend(0, &mut own, stage, SCOUTS_WEIGHT);
-            turned.cost <= own.cost * (1.0 + worth)
-        });
-        descents.trace.truncate(steps);
-        fits
-    }
-
     fn fit(&self, noise_m: f64, mask_weight: f64, explained: f64) -> JointFit {
         JointFit {
             basis: if self.mask.is_some() { Basis::Both } else { Basis::Membrane },
@@ -421,16 +388,21 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// True where the first scouts agree on an answer in the prior that explains enough, so that nobody looks elsewhere.
+    /// True where grasps are known to be from the lab's grid and the first scouts agree on an answer that explains enough, so that
+    /// nobody looks elsewhere. One of eleven others was wrong where nothing was known.
     pub(super) fn stands(&self, answer: &Answer) -> bool {
-        let least = if self.predicted { PREDICTED_EXPLAINED } else { STANDS[usize::from(self.free.reaches)] };
-        answer.settled && answer.rung == Rung::Single && self.mask.is_some() && answer.fit.explained >= least
+        let least = if self.predicted { PREDICTED_EXPLAINED } else { STANDS };
+        self.ask.in_lab_grid
+            && answer.settled
+            && answer.rung == Rung::Single
+            && answer.fit.basis == Basis::Both
+            && answer.fit.explained >= least
     }
 
     /// Scouts all around; a pose that they find is the answer if it is cheaper by a margin than the one in the prior.
     pub(super) fn look_around(&self, points_yz: &[DVec2], at_hand: Found) -> Found {
         let mut descents = self.descents();
-        descents.around = true;
+        descents.steps = STEPS_AROUND;
         descents.patches[0] = self.patches_of(0, PLACES_AROUND);
         let (mut starts, mut runs): (Vec<State>, Vec<Progress>) =
             self.anywhere(&mut descents, ENDS).into_iter().unzip();
@@ -440,8 +412,14 @@ impl<'a> Problem<'a> {
         let known = at_hand.as_ref().ok().map(|report| State::from_pose(report.grasp_from_object, self.centroid));
         starts.extend(known);
         runs.extend(known.map(Progress::new));
+        // Templates of its place are worth their making only for one that may be the best, and for the one at hand.
         for (run, at) in runs.iter_mut().enumerate() {
-            self.settle(&mut descents, run, at, weight);
+            descents.descend(run, at, LAST, weight);
+        }
+        let dearest = runs.iter().map(|at| at.cost).fold(f64::INFINITY, f64::min) * (1.0 + CLOSE);
+        let found = starts.len() - usize::from(known.is_some());
+        for (run, at) in runs.iter_mut().enumerate().filter(|(run, at)| at.cost <= dearest || *run == found) {
+            descents.settle(run, at, weight);
         }
         // One in the prior stays unless another one is ahead.
         let first = runs.last().filter(|first| known.is_some() && self.allowed(first));
@@ -451,8 +429,9 @@ impl<'a> Problem<'a> {
         let found = (0..runs.len()).filter(|run| self.config.allows(runs[*run].state.to_pose(self.centroid)));
         let winner = found.min_by(|a, b| runs[*a].cost.total_cmp(&runs[*b].cost)).filter(|run| runs[*run].cost < limit);
         let told = winner.map(|run| (run, descents.told(runs[run].state)));
-        // Where the mask has no contact either, a membrane must show some.
-        let measured = if at_hand.is_err() { EXPLAINED } else { f64::NEG_INFINITY };
+        // Where the mask alone has an answer, or none, a membrane must show some contact.
+        let by_membrane = at_hand.as_ref().is_ok_and(AlignReport::has_membrane);
+        let measured = if by_membrane { f64::NEG_INFINITY } else { EXPLAINED };
         let least = if self.predicted { PREDICTED_EXPLAINED } else { measured };
         let told = told.filter(|(_, (explained, _))| *explained >= least);
         // Of equal answers the one that is turned least; where that is the answer in the prior, it stays as it was.
@@ -460,28 +439,17 @@ impl<'a> Problem<'a> {
             let pose = runs[winner].state.to_pose(self.centroid);
             State::from_pose(Symmetry::of(self.tool).nearest(pose, PlanarPose::default()), self.centroid)
         });
-        let stays = upright.zip(known).is_some_and(|(upright, known)| alike(&upright, &known));
+        let stays = by_membrane && upright.zip(known).is_some_and(|(upright, known)| alike(&upright, &known));
         let Some(((winner, (explained, noise_m)), upright)) = told.zip(upright).filter(|_| !stays) else {
             return at_hand.map(|report| AlignReport { ends, ..report });
         };
         runs[winner].state = State { phi: crate::units::wrap_angle(upright.phi), ..upright };
-        self.settle(&mut descents, winner, &mut runs[winner], weight);
+        descents.settle(winner, &mut runs[winner], weight);
         let fit = self.fit(noise_m, weight, explained);
         let (starts, points) = (starts.iter().map(|at| at.to_pose(self.centroid)).collect(), descents.points());
         let (lookups, trace) = (descents.lookups, descents.trace);
         let answer = Answer { starts, runs, winner, rung: Rung::Around, fit, lookups, trace, points, settled: false };
         Ok(AlignReport { ends, ..self.report(points_yz, answer) })
-    }
-
-    /// The last descent, again with the template of where it ended until that is the same.
-    fn settle(&self, descents: &mut Descents<'_, '_>, run: usize, at: &mut Progress, weight: f64) {
-        for _ in 0..SETTLED {
-            let grasp = self.grasp(at.state, true);
-            descents.descend(run, at, LAST, weight);
-            if self.grasp(at.state, true) == grasp {
-                break;
-            }
-        }
     }
 
     /// Runs by preference: within the prior before outside, then the cheaper one.
@@ -512,7 +480,7 @@ impl<'a> Problem<'a> {
             let at = runs[run];
             let worth = at.cost <= limit && self.allowed(&at) == self.allowed(&runs[order[0]]);
             if refined.is_empty() || worth && refined.len() < 2 && !alike(&runs[refined[0]].state, &at.state) {
-                descents.descend(run, &mut runs[run], LAST, weight);
+                descents.settle(run, &mut runs[run], weight);
                 refined.push(run);
             }
         }
@@ -533,7 +501,8 @@ impl<'a> Problem<'a> {
         let best = answer.runs[answer.winner];
         let pose = best.state.to_pose(self.centroid);
         let pose = Prior::default().slid_in(pose, || self.uncertainty(pose));
-        let seen = self.mask.as_ref().map(|[_, cloud]| of_cloud(cloud, self.centroid, &self.tool.field, best.state));
+        let mask = self.mask.as_ref().filter(|_| answer.fit.basis == Basis::Both);
+        let seen = mask.map(|[_, cloud]| of_cloud(cloud, self.centroid, &self.tool.field, best.state));
         let square = KERNELS_M[LAST].powi(2);
         let run = |(run, start): (&Progress, &PlanarPose)| Run {
             requested: *start,

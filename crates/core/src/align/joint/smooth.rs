@@ -4,14 +4,16 @@ use crate::align::lanes::LANES;
 use crate::relax::Field;
 
 /// Deviations, meters.
-const SIGMAS_M: [f64; 6] = [0.7e-3, 1e-3, 1.5e-3, 2e-3, 3e-3, 8e-3];
+const SIGMAS_M: [f64; 4] = [1e-3, 1.5e-3, 3e-3, 8e-3];
 /// Nodes of the fine grid from one node to the next of the grid that a width is kept on.
-const STRIDES: [usize; 6] = [1, 1, 1, 2, 2, 4];
+const STRIDES: [usize; 4] = [1, 1, 2, 4];
 
 /// A band of lengths: positions in [`SIGMAS_M`] of the narrower and the wider Gaussian, whose difference it is.
 pub(super) type Band = [usize; 2];
-/// Bands, coarse to fine. A finer one is pixel noise on real cameras.
-pub(super) const BANDS: [Band; 3] = [[2, 5], [1, 4], [0, 3]];
+/// Bands: the one that starts are told apart by, and the one that decides. A finer one is pixel noise.
+pub(super) const BANDS: [Band; 2] = [[1, 3], [0, 2]];
+/// Position of the deciding one.
+pub(super) const DECIDING: usize = 1;
 
 /// Values on a grid, `C` for each node side by side, row by row. Rows are padded with zeros to whole steps of lanes.
 pub(super) struct Layer<const C: usize> {

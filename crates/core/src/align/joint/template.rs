@@ -6,17 +6,11 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::DVec2;
 
-use super::smooth::{BANDS, Layer, Smooth};
+use super::smooth::{BANDS, DECIDING, Layer, Smooth};
 use crate::frames::PlanarPose;
 use crate::relax::Field;
-use crate::tent::{FreeShape, heights, lifted, tent};
+use crate::tent::{FreeShape, Sheet, heights, lifted, tent};
 use crate::tool::ToolModel;
-
-/// Templates are made for free membranes so far apart: height (meters), slopes, and bends (1/m).
-const STEPS: [f64; 5] = [1e-3, 0.05, 0.05, 2.0, 2.0];
-/// Curvatures of free membranes, 1/m: of a large bubble, and of a small one.
-const FLATTEST: f64 = 8.0;
-const ROUNDEST: f64 = 400.0;
 
 /// A band of a membrane's height over the y-z plane of the object frame, meters.
 pub(super) struct BandField {
@@ -30,78 +24,113 @@ pub(super) struct BandField {
 /// The bands of one side of a tool, in the order of [`BANDS`].
 pub(super) type Template = [Arc<BandField>; BANDS.len()];
 
-/// Steps of height, slopes and bends, the side, whether the free membrane reaches the middle plane, and the grasp.
-type Key = ([i32; 5], bool, bool, Grasp);
-
-/// Poses of a tool under a free membrane of which one template is made: steps of the angle and of y and z. The one of the
-/// lab's grasps is 0.
-pub(super) type Grasp = [i8; 3];
-/// Angles in a full turn.
-pub(super) const ANGLES: i32 = 8;
-/// Step of the place, meters.
-const SHIFT_M: f64 = 0.012;
-/// Most templates that are kept of a tool.
-const KEPT: usize = 200;
-
-/// The grasp of a pose, `grasp_from_object`.
-pub(super) fn grasp_of(pose: PlanarPose) -> Grasp {
-    let turn = (pose.theta_rad / TAU * f64::from(ANGLES)).round() as i32;
-    [
-        turn.rem_euclid(ANGLES) as i8,
-        (pose.y_m / SHIFT_M).round().clamp(-9.0, 9.0) as i8,
-        (pose.z_m / SHIFT_M).round().clamp(-9.0, 9.0) as i8,
-    ]
+/// Poses of a tool and free membranes of which one template is made: by the turn alone, for the search, or by the place as
+/// well, for the answer.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Grasp {
+    /// Steps of the angle and of y and z.
+    steps: [i8; 3],
+    placed: bool,
 }
 
-/// The templates of a tool. `None` where the tool has nothing on that side.
-#[derive(Default)]
-struct Templates(Mutex<BTreeMap<Key, Option<Arc<Template>>>>);
+/// Turns of the search.
+pub(super) const TURNS: i8 = 8;
+/// Step of the place, and the farthest one, meters.
+const SHIFT_M: f64 = 6e-3;
+const FARTHEST_M: f64 = 0.06;
+/// Steps of free membranes for the answer: height (meters), slopes, and bends (1/m). Twice these for the search.
+const STEPS: [f64; 5] = [0.5e-3, 0.025, 0.025, 1.0, 1.0];
+/// Curvatures of free membranes that reach the middle plane, 1/m: of a large bubble, and of a small one.
+const FLATTEST: f64 = 8.0;
+const ROUNDEST: f64 = 400.0;
+/// Most templates that are kept of a tool.
+const KEPT: usize = 120;
 
-/// Steps of a free shape, and the shape that they stand for.
-pub(super) fn keyed(free: FreeShape) -> ([i32; 5], FreeShape) {
-    let all = if free.reaches {
-        // A tent depends on the curvature alone.
-        let curvature = free.bend.element_sum().clamp(FLATTEST, ROUNDEST);
-        [0.0, 0.0, 0.0, 0.5 * curvature, 0.5 * curvature]
-    } else {
-        [free.height_m, free.slope.x, free.slope.y, free.bend.x, free.bend.y]
-    };
-    let steps: [i32; 5] = std::array::from_fn(|i| (all[i] / STEPS[i]).round().clamp(-400.0, 400.0) as i32);
-    let [height_m, y, z, yy, zz] = std::array::from_fn(|i| f64::from(steps[i]) * STEPS[i]);
-    (steps, FreeShape { height_m, slope: DVec2::new(y, z), bend: DVec2::new(yy, zz), ..free })
+impl Grasp {
+    /// The grasp of a pose, `grasp_from_object`, by its turn alone or `placed`.
+    pub(super) fn of(pose: PlanarPose, placed: bool) -> Self {
+        let turns = Self { steps: [0; 3], placed }.turns();
+        let turn = (pose.theta_rad / TAU * f64::from(turns)).round() as i32;
+        let shift = |m: f64| (m.clamp(-FARTHEST_M, FARTHEST_M) / SHIFT_M).round() as i8;
+        let [y, z] = if placed { [pose.y_m, pose.z_m].map(shift) } else { [0; 2] };
+        Self { steps: [turn.rem_euclid(i32::from(turns)) as i8, y, z], placed }
+    }
+
+    /// One of [`TURNS`].
+    pub(super) fn turned(turn: i8) -> Self {
+        Self { steps: [turn, 0, 0], placed: false }
+    }
+
+    fn turns(self) -> i8 {
+        if self.placed { 2 * TURNS } else { TURNS }
+    }
+
+    fn pose(self) -> PlanarPose {
+        let [turn, y, z] = self.steps.map(f64::from);
+        PlanarPose { theta_rad: TAU * turn / f64::from(self.turns()), y_m: y * SHIFT_M, z_m: z * SHIFT_M }
+    }
+
+    /// Steps of a free shape, and the shape that they stand for.
+    pub(super) fn keyed(self, free: FreeShape) -> ([i32; 5], FreeShape) {
+        let step = |i: usize| if self.placed { STEPS[i] } else { 2.0 * STEPS[i] };
+        let all = if free.reaches {
+            // A tent depends on the curvature alone.
+            let half = 0.5 * free.bend.element_sum().clamp(FLATTEST, ROUNDEST);
+            [0.0, 0.0, 0.0, half, half]
+        } else {
+            [free.height_m, free.slope.x, free.slope.y, free.bend.x, free.bend.y]
+        };
+        let steps: [i32; 5] = std::array::from_fn(|i| (all[i] / step(i)).round().clamp(-1000.0, 1000.0) as i32);
+        let [height_m, y, z, yy, zz] = std::array::from_fn(|i| f64::from(steps[i]) * step(i));
+        (steps, FreeShape { height_m, slope: DVec2::new(y, z), bend: DVec2::new(yy, zz), of: self.pose(), ..free })
+    }
+}
+
+/// The tops of a tool's sides, and the templates that were made over them.
+struct Templates {
+    tops: [Option<Sheet>; 2],
+    kept: Mutex<BTreeMap<([i32; 5], [bool; 2], Grasp), Arc<Template>>>,
+}
+
+impl Templates {
+    fn of(tool: &ToolModel) -> Self {
+        Self { tops: [-1.0, 1.0].map(|side| heights(&tool.mesh, side)), kept: Mutex::default() }
+    }
 }
 
 /// The template of a tool on the side of the middle plane where x has the sign of `side`, under a membrane of this free shape.
-/// Made at the first request (some 50 ms) and kept with the tool.
+/// Made at the first request (some milliseconds) and kept with the tool. `None` where the tool has nothing on that side.
 pub(super) fn template(tool: &ToolModel, side: f64, free: FreeShape, grasp: Grasp) -> Option<Arc<Template>> {
-    let grasp = if free.reaches { Grasp::default() } else { grasp };
-    let (steps, free) = keyed(free);
-    let [turn, y_m, z_m] = grasp.map(f64::from);
-    let of = PlanarPose { theta_rad: TAU * turn / f64::from(ANGLES), y_m: y_m * SHIFT_M, z_m: z_m * SHIFT_M };
-    let free = FreeShape { of, ..free };
-    let kept = tool.derived(|_| Templates::default());
-    let mut kept = kept.0.lock().unwrap_or_else(PoisonError::into_inner);
-    if kept.len() > KEPT {
-        kept.retain(|(_, _, _, [_, y, z]), _| [*y, *z] == [0, 0]);
+    let grasp = if free.reaches { Grasp { steps: [0; 3], ..grasp } } else { grasp };
+    let (steps, free) = grasp.keyed(free);
+    let templates = tool.derived(Templates::of);
+    let lock = || templates.kept.lock().unwrap_or_else(PoisonError::into_inner);
+    let key = (steps, [side > 0.0, free.reaches], grasp);
+    let known = lock().get(&key).cloned();
+    if known.is_some() {
+        return known;
     }
-    kept.entry((steps, side > 0.0, free.reaches, grasp)).or_insert_with(|| made(tool, side, free).map(Arc::new)).clone()
+    let made = Arc::new(made(templates.tops[usize::from(side > 0.0)].as_ref()?, &free, grasp.placed));
+    let mut kept = lock();
+    if kept.len() > KEPT {
+        kept.retain(|(_, _, grasp), _| !grasp.placed);
+    }
+    kept.insert(key, made.clone());
+    Some(made)
 }
 
-fn made(tool: &ToolModel, side: f64, free: FreeShape) -> Option<Template> {
-    let top = heights(&tool.mesh, side)?;
-    // The lab's grasps have the finer grid.
-    let top = if free.of == PlanarPose::default() { top } else { top.thinned() };
-    let sheet = if free.reaches { tent(&top, free.bend.element_sum()) } else { lifted(&top, &free) };
+fn made(top: &Sheet, free: &FreeShape, placed: bool) -> Template {
+    let thinned = (!placed).then(|| top.thinned());
+    let top = thinned.as_ref().unwrap_or(top);
+    let sheet = if free.reaches { tent(top, free.bend.element_sum()) } else { lifted(top, free) };
     let smooth = Smooth::new(&Layer::of(&sheet.field), sheet.step_m, 0.0);
-    let (columns, rows) = (sheet.field.columns, sheet.field.rows);
-    Some(BANDS.map(|[narrow, wide]| {
-        let mut field = Field::filled(columns, rows, 0.0);
-        for row in 0..rows {
-            for column in 0..columns {
-                field.values[row * columns + column] =
-                    smooth.at(narrow, column, row)[0] - smooth.at(wide, column, row)[0];
-            }
-        }
-        Arc::new(BandField { field, origin: sheet.origin, step_m: sheet.step_m })
-    }))
+    std::array::from_fn(|i| {
+        // A coarse band is smooth enough for every second node.
+        let ([narrow, wide], every) = (BANDS[i], if placed && i != DECIDING { 2 } else { 1 });
+        let (columns, rows) = (sheet.field.columns.div_ceil(every), sheet.field.rows.div_ceil(every));
+        let at = |sigma: usize, k: usize| smooth.at(sigma, k % columns * every, k / columns * every)[0];
+        let values = (0..columns * rows).map(|k| at(narrow, k) - at(wide, k)).collect();
+        let field = Field { columns, rows, values };
+        Arc::new(BandField { field, origin: sheet.origin, step_m: sheet.step_m * every as f64 })
+    })
 }

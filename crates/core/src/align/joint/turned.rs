@@ -6,10 +6,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::DVec2;
 
-use super::template::{ANGLES, BandField, grasp_of, keyed, template};
+use super::template::{self, BandField, Grasp, template};
 use crate::align::batch::State;
 use crate::align::lanes::LANES;
-use crate::frames::PlanarPose;
 use crate::mesh::TriMesh;
 use crate::tent::FreeShape;
 use crate::tool::ToolModel;
@@ -96,17 +95,17 @@ struct AllTurned(Mutex<BTreeMap<Key, Arc<Turned>>>);
 
 /// The coarsest band of a template turned all around, each with the free membrane of about its turn. Made at the first request.
 pub(super) fn turned(tool: &ToolModel, side: f64, free: FreeShape, frame: Frame) -> Option<Arc<Turned>> {
-    let key = (keyed(free).0, side > 0.0, free.reaches);
+    let key = (Grasp::default().keyed(free).0, side > 0.0, free.reaches);
     let kept = tool.derived(|_| AllTurned::default());
     let mut kept = kept.0.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(turned) = kept.get(&key) {
         return Some(turned.clone());
     }
-    let of = |turn: i32| template(tool, side, free, [turn as i8, 0, 0]);
-    let templates = (0..ANGLES).map(of).collect::<Option<Vec<_>>>()?;
+    let of = |turn: i8| template(tool, side, free, Grasp::turned(turn));
+    let templates = (0..template::TURNS).map(of).collect::<Option<Vec<_>>>()?;
     let turned = Arc::new(Turned::new(frame, |phi| {
-        let [turn, ..] = grasp_of(PlanarPose { theta_rad: -phi, ..PlanarPose::default() });
-        &*templates[turn as usize][0]
+        let turn = (-phi / TAU * f64::from(template::TURNS)).round() as i32;
+        &*templates[turn.rem_euclid(i32::from(template::TURNS)) as usize][0]
     }));
     kept.insert(key, turned.clone());
     Some(turned)
