@@ -86,10 +86,14 @@ impl Grasp {
     }
 }
 
+/// Steps of a free shape, whether the side is the positive one, and whether the free membrane reaches the middle plane, and the
+/// grasp.
+type Key = ([i32; 5], [bool; 2], Grasp);
+
 /// The tops of a tool's sides, and the templates that were made over them.
 struct Templates {
     tops: [Option<Sheet>; 2],
-    kept: Mutex<BTreeMap<([i32; 5], [bool; 2], Grasp), Arc<Template>>>,
+    kept: Mutex<BTreeMap<Key, Arc<Template>>>,
 }
 
 impl Templates {
