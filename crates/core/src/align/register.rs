@@ -99,7 +99,8 @@ pub struct Ask<'a> {
     pub starts: Option<&'a [PlanarPose]>,
     /// Keep per-iteration states and per-point residuals.
     pub record: bool,
-    /// The pose probably lies in the lab's grid: one outside must be ahead by more. It decides no verdict.
+    /// The pose probably lies in the lab's grid: one in it that stands is not looked beyond, and one outside must be ahead by
+    /// more. It decides no verdict.
     pub in_lab_grid: bool,
     /// Gather the evidence for and against the answer.
     pub evidence: bool,

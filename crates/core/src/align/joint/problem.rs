@@ -417,8 +417,9 @@ impl<'a> Problem<'a> {
             descents.descend(run, at, LAST, weight);
         }
         let dearest = runs.iter().map(|at| at.cost).fold(f64::INFINITY, f64::min) * (1.0 + CLOSE);
-        let found = starts.len() - usize::from(known.is_some());
-        for (run, at) in runs.iter_mut().enumerate().filter(|(run, at)| at.cost <= dearest || *run == found) {
+        // The one at hand is the last.
+        let others = runs.len() - usize::from(known.is_some());
+        for (run, at) in runs.iter_mut().enumerate().filter(|(run, at)| at.cost <= dearest || *run == others) {
             descents.settle(run, at, weight);
         }
         // One in the prior stays unless another one is ahead.

@@ -33,8 +33,8 @@ pub(super) struct Grasp {
     placed: bool,
 }
 
-/// Turns of the search.
-pub(super) const TURNS: i8 = 8;
+/// Turns of the search; twice as many for the answer.
+const TURNS: i8 = 8;
 /// Step of the place, and the farthest one, meters.
 const SHIFT_M: f64 = 6e-3;
 const FARTHEST_M: f64 = 0.06;
@@ -54,11 +54,6 @@ impl Grasp {
         let shift = |m: f64| (m.clamp(-FARTHEST_M, FARTHEST_M) / SHIFT_M).round() as i8;
         let [y, z] = if placed { [pose.y_m, pose.z_m].map(shift) } else { [0; 2] };
         Self { steps: [turn.rem_euclid(i32::from(turns)) as i8, y, z], placed }
-    }
-
-    /// One of [`TURNS`].
-    pub(super) fn turned(turn: i8) -> Self {
-        Self { steps: [turn, 0, 0], placed: false }
     }
 
     fn turns(self) -> i8 {
@@ -86,8 +81,7 @@ impl Grasp {
     }
 }
 
-/// Steps of a free shape, whether the side is the positive one, and whether the free membrane reaches the middle plane, and the
-/// grasp.
+/// Steps of a free shape, whether the side is the positive one, whether the free membrane reaches the middle plane, and the grasp.
 type Key = ([i32; 5], [bool; 2], Grasp);
 
 /// The tops of a tool's sides, and the templates that were made over them.

@@ -6,9 +6,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::DVec2;
 
-use super::template::{self, BandField, Grasp, template};
+use super::template::{Grasp, Template, template};
 use crate::align::batch::State;
 use crate::align::lanes::LANES;
+use crate::frames::PlanarPose;
 use crate::mesh::TriMesh;
 use crate::tent::FreeShape;
 use crate::tool::ToolModel;
@@ -50,25 +51,29 @@ impl Frame {
 
     /// The state of a turn and a place.
     pub(super) fn state(&self, turn: usize, row: usize, column: usize) -> State {
-        let phi = crate::units::wrap_angle(TAU * turn as f64 / TURNS as f64);
+        let phi = crate::units::wrap_angle(angle(turn));
         let middle = 0.5 * (self.side - 1) as f64;
         let place = DVec2::new(column as f64 - middle, row as f64 - middle) * self.cell_m;
         State { phi, place: self.center + DVec2::from_angle(phi).rotate(place) }
     }
 }
 
+/// A turn of the object frame, radians.
+fn angle(turn: usize) -> f64 {
+    TAU * turn as f64 / TURNS as f64
+}
+
 /// A band of a template's heights in cells, for each turn row by row, meters.
 pub(super) struct Turned(pub(super) Vec<f32>);
 
 impl Turned {
-    /// `band_at` is the band for a turn of the object frame, radians.
-    fn new<'b>(frame: Frame, band_at: impl Fn(f64) -> &'b BandField) -> Self {
+    /// Of the template for each turn of the object frame.
+    fn new(frame: Frame, templates: &[Arc<Template>]) -> Self {
         let width = frame.width();
         let middle = 0.5 * (width - 1) as f64;
         let mut cells = Vec::with_capacity(TURNS * width * width);
-        for turn in 0..TURNS {
-            let phi = TAU * turn as f64 / TURNS as f64;
-            let (turn, band) = (DVec2::from_angle(phi), band_at(phi));
+        for (turn, [band, ..]) in templates.iter().map(|template| &**template).enumerate() {
+            let turn = DVec2::from_angle(angle(turn));
             for at in 0..width * width {
                 let cell = DVec2::new((at % width) as f64 - middle, (at / width) as f64 - middle);
                 let mean = (0..9).map(|part| {
@@ -101,12 +106,9 @@ pub(super) fn turned(tool: &ToolModel, side: f64, free: FreeShape, frame: Frame)
     if let Some(turned) = kept.get(&key) {
         return Some(turned.clone());
     }
-    let of = |turn: i8| template(tool, side, free, Grasp::turned(turn));
-    let templates = (0..template::TURNS).map(of).collect::<Option<Vec<_>>>()?;
-    let turned = Arc::new(Turned::new(frame, |phi| {
-        let turn = (-phi / TAU * f64::from(template::TURNS)).round() as i32;
-        &*templates[turn.rem_euclid(i32::from(template::TURNS)) as usize][0]
-    }));
+    let grasp = |turn: usize| Grasp::of(PlanarPose { theta_rad: -angle(turn), ..PlanarPose::default() }, false);
+    let of = |turn: usize| template(tool, side, free, grasp(turn));
+    let turned = Arc::new(Turned::new(frame, &(0..TURNS).map(of).collect::<Option<Vec<_>>>()?));
     kept.insert(key, turned.clone());
     Some(turned)
 }
