@@ -33,7 +33,7 @@ use problem::{Answer, Problem};
 
 /// Share of the membrane's relief below which the membrane alone is asked as well, and answers if it explains more.
 const DOUBTFUL: f64 = 0.3;
-/// Least share of the membrane's relief that the tool must explain, or the mask alone answers.
+/// Least share of the membrane's relief that the tool must explain without a mask that agrees; with one it is any.
 const EXPLAINED: f64 = 0.05;
 /// The same of a predicted one.
 const PREDICTED_EXPLAINED: f64 = 0.5;
@@ -114,7 +114,8 @@ impl JointConfig {
             // A bad mask can lead all scouts away from what the membrane shows plainly.
             answer = problem.solve_without_mask(&answer, EXPLAINED).unwrap_or(answer);
         }
-        if answer.fit.explained < EXPLAINED {
+        let least = if answer.fit.basis == Basis::Both { 0.0 } else { EXPLAINED };
+        if answer.fit.explained <= least {
             return Err(JointFit { basis: Basis::LittleContact, mask_weight: 1.0, ..answer.fit });
         }
         Ok(answer)

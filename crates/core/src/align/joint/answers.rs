@@ -13,7 +13,7 @@ use crate::symmetry::Symmetry;
 use crate::units::angle_error;
 
 /// Share of the difference of costs that counts: model errors make costs differ by more than noise does. From fresh grasps.
-const COUNTS: f64 = 0.05;
+const COUNTS: f64 = 0.04;
 /// Least weight of an answer that is told.
 const LEAST: f64 = 0.1;
 /// Ends at most this far apart are one: radians, meters. Farther ones are where the cost between them is hardly higher, as a

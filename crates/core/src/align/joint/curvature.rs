@@ -16,7 +16,7 @@ const PLACES: usize = 800;
 const KERNEL_M: f64 = 0.5e-3;
 /// The variance of a place's height is four times this times the noise that is left, meters: neighbors err together, and a
 /// part of what is left is the template's error, which hardly moves the pose. From fresh grasps under two laws.
-const SHARED_M: f64 = 1e-4;
+const SHARED_M: f64 = 8e-5;
 /// The same of predicted images, whose errors go together over the width of a bar. From fresh grasps that the shipped
 /// generator predicted.
 const PREDICTED_SHARED_M: f64 = 42e-5;

@@ -7,6 +7,7 @@ use super::JointConfig;
 use super::answers::{PoseAnswer, shared};
 use super::cost::{Joint, Relief};
 use super::problem::{Patches, Problem};
+use super::smooth::FINEST;
 use crate::align::batch::State;
 use crate::align::search::{Cost, Progress, minimize};
 use crate::align::{AlignReport, Ask, Contacts, PadImage, Prior, Range, Scene, Uncertainty};
@@ -26,7 +27,7 @@ const LOOK: Look = Look { band: 1, kernel_m: 1e-3, places: 800 };
 const DESCENT: [Look; 3] = [
     Look { band: 0, kernel_m: 4e-3, places: 200 },
     Look { band: 1, kernel_m: 1e-3, places: 300 },
-    Look { band: 1, kernel_m: 0.5e-3, places: 600 },
+    Look { band: FINEST, kernel_m: 0.5e-3, places: 600 },
 ];
 const STEPS: usize = 20;
 /// Step that moves no point by more than about this ends a descent, meters.
@@ -144,7 +145,8 @@ impl Problem<'_> {
             .filter(|finger| finger[0].1.len() > 0)
             .map(|finger| Relief::of(finger, at, LOOK.kernel_m).likeness())
             .fold(1.0, f64::min);
-        let descent = DESCENT.map(|look| (self.patches_at(look.band, look.places, at), look.kernel_m));
+        let descent =
+            DESCENT.map(|look| (self.patches_at(look.band.min(self.finest()), look.places, at), look.kernel_m));
         let all = 0..descent[0].0.len();
         let (own, gain) = descend(&descent, all.clone(), at);
         let alone: Vec<(State, f64)> = all.map(|finger| descend(&descent, finger..finger + 1, own)).collect();

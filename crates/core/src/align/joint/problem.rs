@@ -8,7 +8,7 @@ use glam::DVec2;
 
 use super::cost::{Joint, MaskPart, Noted, Patch, Relief, noise_m};
 use super::image::Image;
-use super::smooth::{BANDS, DECIDING};
+use super::smooth::{BANDS, DECIDING, FINEST};
 use super::template::{BandField, Grasp, Template, template};
 use super::turned::{Frame, Turned, turned};
 use super::{Basis, EXPLAINED, Found, JointConfig, JointFit, PREDICTED_EXPLAINED};
@@ -135,10 +135,8 @@ fn under(patches: &Patches, templates: &[Arc<Template>], band: usize) -> Patches
 }
 
 impl Descents<'_, '_> {
-    /// Goes down on one band, with the templates of a grasp.
-    fn descend_on(&mut self, grasp: Grasp, run: usize, at: &mut Progress, stage: usize, weight: f64) {
-        let templates = self.problem.templates(grasp);
-        let fingers = &under(&self.patches[stage], &templates, stage.min(DECIDING));
+    /// Goes down on the images under templates as a stage does.
+    fn descend_on(&mut self, fingers: &Patches, run: usize, at: &mut Progress, stage: usize, weight: f64) {
         let last = usize::from(stage == LAST);
         let mask = self.problem.mask.as_ref().map(|clouds| MaskPart {
             field: &self.problem.tool.field,
@@ -154,19 +152,35 @@ impl Descents<'_, '_> {
         self.lookups += joint.lookups;
     }
 
+    /// A stage's images under the templates of a grasp.
+    fn under(&self, grasp: Grasp, stage: usize) -> Patches {
+        under(&self.patches[stage], &self.problem.templates(grasp), stage.min(DECIDING))
+    }
+
     /// Goes down on one band, with the templates of its turn.
     pub(super) fn descend(&mut self, run: usize, at: &mut Progress, stage: usize, weight: f64) {
-        self.descend_on(self.problem.grasp(at.state, false), run, at, stage, weight);
+        let fingers = self.under(self.problem.grasp(at.state, false), stage);
+        self.descend_on(&fingers, run, at, stage, weight);
     }
 
     /// The last descent, with the templates of its place, again until it ends where they are of.
     fn settle(&mut self, run: usize, at: &mut Progress, weight: f64) {
         for _ in 0..SETTLED {
             let grasp = self.problem.grasp(at.state, true);
-            self.descend_on(grasp, run, at, LAST, weight);
+            self.descend_on(&self.under(grasp, LAST), run, at, LAST, weight);
             if self.problem.grasp(at.state, true) == grasp {
                 break;
             }
+        }
+    }
+
+    /// The winner's last descent once more in the finest band. Its cost stays what it was compared by.
+    fn polish(&mut self, run: usize, at: &mut Progress, weight: f64) {
+        let problem = self.problem;
+        if problem.finest() == FINEST {
+            let cost = at.cost;
+            self.descend_on(&problem.patches_at(FINEST, POINTS[LAST], at.state), run, at, LAST, weight);
+            at.cost = cost;
         }
     }
 
@@ -308,6 +322,12 @@ impl<'a> Problem<'a> {
         self.fingers.iter().filter_map(of).collect()
     }
 
+    /// The finest band that images have in common with their templates: those of a membrane that hangs from the tool, and of a
+    /// predicted one, err in lengths of 0.7 to 1.5 mm.
+    pub(super) fn finest(&self) -> usize {
+        if self.free.reaches && !self.predicted { FINEST } else { DECIDING }
+    }
+
     fn grasp(&self, at: State, placed: bool) -> Grasp {
         Grasp::of(at.to_pose(self.centroid), placed)
     }
@@ -430,11 +450,15 @@ impl<'a> Problem<'a> {
         let found = (0..runs.len()).filter(|run| self.config.allows(runs[*run].state.to_pose(self.centroid)));
         let winner = found.min_by(|a, b| runs[*a].cost.total_cmp(&runs[*b].cost)).filter(|run| runs[*run].cost < limit);
         let told = winner.map(|run| (run, descents.told(runs[run].state)));
-        // Where the mask alone has an answer, or none, a membrane must show some contact.
+        // Where the mask alone has an answer, and the more where it has none, a membrane must show some contact.
         let by_membrane = at_hand.as_ref().is_ok_and(AlignReport::has_membrane);
-        let measured = if by_membrane { f64::NEG_INFINITY } else { EXPLAINED };
+        let measured = match &at_hand {
+            Ok(_) if by_membrane => f64::NEG_INFINITY,
+            Ok(_) => 0.0,
+            Err(_) => EXPLAINED,
+        };
         let least = if self.predicted { PREDICTED_EXPLAINED } else { measured };
-        let told = told.filter(|(_, (explained, _))| *explained >= least);
+        let told = told.filter(|(_, (explained, _))| *explained > least);
         // Of equal answers the one that is turned least; where that is the answer in the prior, it stays as it was.
         let upright = told.map(|(winner, _)| {
             let pose = runs[winner].state.to_pose(self.centroid);
@@ -446,6 +470,7 @@ impl<'a> Problem<'a> {
         };
         runs[winner].state = State { phi: crate::units::wrap_angle(upright.phi), ..upright };
         descents.settle(winner, &mut runs[winner], weight);
+        descents.polish(winner, &mut runs[winner], weight);
         let fit = self.fit(noise_m, weight, explained);
         let (starts, points) = (starts.iter().map(|at| at.to_pose(self.centroid)).collect(), descents.points());
         let (lookups, trace) = (descents.lookups, descents.trace);
@@ -485,7 +510,9 @@ impl<'a> Problem<'a> {
                 refined.push(run);
             }
         }
-        refined.into_iter().min_by(|&a, &b| runs[a].cost.total_cmp(&runs[b].cost)).unwrap_or(0)
+        let winner = refined.into_iter().min_by(|&a, &b| runs[a].cost.total_cmp(&runs[b].cost)).unwrap_or(0);
+        descents.polish(winner, &mut runs[winner], weight);
+        winner
     }
 
     /// Weight of the mask in the answer.

@@ -4,16 +4,18 @@ use crate::align::lanes::LANES;
 use crate::relax::Field;
 
 /// Deviations, meters.
-const SIGMAS_M: [f64; 4] = [1e-3, 1.5e-3, 3e-3, 8e-3];
+const SIGMAS_M: [f64; 5] = [0.7e-3, 1e-3, 1.5e-3, 3e-3, 8e-3];
 /// Nodes of the fine grid from one node to the next of the grid that a width is kept on.
-const STRIDES: [usize; 4] = [1, 1, 2, 4];
+const STRIDES: [usize; 5] = [1, 1, 1, 2, 4];
 
 /// A band of lengths: positions in [`SIGMAS_M`] of the narrower and the wider Gaussian, whose difference it is.
 pub(super) type Band = [usize; 2];
-/// Bands: the one that starts are told apart by, and the one that decides. A finer one is pixel noise.
-pub(super) const BANDS: [Band; 2] = [[1, 3], [0, 2]];
-/// Position of the deciding one.
+/// Bands: the one that starts are told apart by, the one that decides, and the one in which the answer is made precise. A finer
+/// one is pixel noise.
+pub(super) const BANDS: [Band; 3] = [[2, 4], [1, 3], [0, 2]];
+/// Positions of the last two.
 pub(super) const DECIDING: usize = 1;
+pub(super) const FINEST: usize = 2;
 
 /// Values on a grid, `C` for each node side by side, row by row. Rows are padded with zeros to whole steps of lanes.
 pub(super) struct Layer<const C: usize> {

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::DVec2;
 
-use super::smooth::{BANDS, DECIDING, Layer, Smooth};
+use super::smooth::{BANDS, DECIDING, FINEST, Layer, Smooth};
 use crate::frames::PlanarPose;
 use crate::relax::Field;
 use crate::tent::{FreeShape, Sheet, heights, lifted, tent};
@@ -122,13 +122,17 @@ fn made(top: &Sheet, free: &FreeShape, placed: bool) -> Template {
     let top = thinned.as_ref().unwrap_or(top);
     let sheet = if free.reaches { tent(top, free.bend.element_sum()) } else { lifted(top, free) };
     let smooth = Smooth::new(&Layer::of(&sheet.field), sheet.step_m, 0.0);
-    std::array::from_fn(|i| {
+    let band = |i: usize| {
         // A coarse band is smooth enough for every second node.
-        let ([narrow, wide], every) = (BANDS[i], if placed && i != DECIDING { 2 } else { 1 });
+        let ([narrow, wide], every) = (BANDS[i], if placed && i == 0 { 2 } else { 1 });
         let (columns, rows) = (sheet.field.columns.div_ceil(every), sheet.field.rows.div_ceil(every));
         let at = |sigma: usize, k: usize| smooth.at(sigma, k % columns * every, k / columns * every)[0];
         let values = (0..columns * rows).map(|k| at(narrow, k) - at(wide, k)).collect();
         let field = Field { columns, rows, values };
         Arc::new(BandField { field, origin: sheet.origin, step_m: sheet.step_m * every as f64 })
-    })
+    };
+    let deciding = band(DECIDING);
+    // Nothing is compared with the finest band of a membrane that hangs.
+    let finest = if free.reaches { band(FINEST) } else { deciding.clone() };
+    [band(0), deciding, finest]
 }
