@@ -80,7 +80,7 @@ const UNLIKE: Membranes = Membranes {
 };
 /// Weight of contact off the tool beside likeness, and the largest share of it that counts.
 const OFF_COUNTS: f64 = 0.7;
-const OFF_CAP: f64 = 0.4;
+const OFF_CAP: f64 = 0.3;
 /// Difference of the angle and of the place that the fingers then have, radians and meters: below, it is no fault.
 const APART_RAD: Limits = [3.0 / 180.0 * std::f64::consts::PI, 5.0 / 180.0 * std::f64::consts::PI];
 const APART_M: Limits = [2e-3, 4e-3];
@@ -92,7 +92,7 @@ const PLACE_SD_M: Limits = [PLACE_OPEN_M, f64::INFINITY];
 /// Limits of the misfit of a pose beyond the lab's grasps, and the weights in it of contact off the tool and of the misfit that goes
 /// away near by: among all poses any tool fits somewhere, and the likeness alone does not detect it. From other tools at fresh grasps;
 /// a mask by depth alone, a third of which lies off the tool, makes no pose wrong.
-const ANYWHERE: Limits = [0.55, 1.25];
+const ANYWHERE: Limits = [0.55, 1.15];
 const ANYWHERE_OFF: f64 = 2.0;
 const ANYWHERE_ELSEWHERE: f64 = 4.0;
 /// Chance of the answer below which another one is told.
