@@ -33,7 +33,7 @@ use problem::{Answer, Problem};
 
 /// Share of the membrane's relief below which the membrane alone is asked as well, and answers if it explains more.
 const DOUBTFUL: f64 = 0.3;
-/// Least share of the membrane's relief that the tool must explain without a mask that agrees; with one it is any.
+/// Least share of the membrane's relief that the tool must explain without a mask that agrees; with one, any positive share will do.
 const EXPLAINED: f64 = 0.05;
 /// The same of a predicted one.
 const PREDICTED_EXPLAINED: f64 = 0.5;

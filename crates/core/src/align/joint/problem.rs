@@ -28,7 +28,7 @@ use crate::tool::ToolModel;
 
 /// Smallest area of the membranes that is compared, square meters.
 const MIN_AREA_M2: f64 = 1e-4;
-/// Places of the membranes that are compared in each band, coarse to fine, and for the answer (in the finest).
+/// Places of the membranes that are compared in each band, coarse to fine, and for the answer.
 pub(super) const POINTS: [usize; LAST + 1] = [100, 150, 400, 3000];
 /// Position in [`POINTS`] of what decides the answer.
 pub(super) const LAST: usize = 3;
@@ -135,7 +135,7 @@ fn under(patches: &Patches, templates: &[Arc<Template>], band: usize) -> Patches
 }
 
 impl Descents<'_, '_> {
-    /// Goes down on the images under templates as a stage does.
+    /// The descent of a stage on images under templates.
     fn descend_on(&mut self, fingers: &Patches, run: usize, at: &mut Progress, stage: usize, weight: f64) {
         let last = usize::from(stage == LAST);
         let mask = self.problem.mask.as_ref().map(|clouds| MaskPart {
@@ -186,10 +186,7 @@ impl Descents<'_, '_> {
 
     /// Share of the membranes' relief that the tool explains at a state, and the noise that it leaves, meters.
     fn told(&self, state: State) -> (f64, f64) {
-        let problem = self.problem;
-        let templates = problem.templates(problem.grasp(state, true));
-        let fingers = under(&self.patches[LAST], &templates, DECIDING);
-        let relief = Relief::of(&fingers, state, KERNELS_M[LAST]);
+        let relief = Relief::of(&self.under(self.problem.grasp(state, true), LAST), state, KERNELS_M[LAST]);
         (relief.explained(), noise_m(relief.residuals_m))
     }
 
