@@ -101,20 +101,6 @@ struct Held {
     tolerance: CameraTolerance,
 }
 
-/// Soap film that reaches the middle plane of a tool.
-fn film(half_thickness_m: f64) -> BubbleConfig {
-    BubbleConfig {
-        // The free membrane was seen somewhat nearer than it is pressed on.
-        press_m: half_thickness_m + 3.5e-3,
-        dome_rise_m: 0.028,
-        dome_fullness: 0.0,
-        rim_tilt: 0.04,
-        pressure_per_m: 28.0,
-        stiffening: 0.0,
-        ..BubbleConfig::default()
-    }
-}
-
 fn held(tools: &[ToolSpec], reach: Reach, seed: u64, position: usize, tolerance: CameraTolerance) -> Held {
     let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_mul(1_000_003).wrapping_add(position as u64));
     rng.set_stream(reach as u64 + 1);
@@ -125,7 +111,7 @@ fn held(tools: &[ToolSpec], reach: Reach, seed: u64, position: usize, tolerance:
     let stratum = if four % 5 == 4 { Stratum::Hard } else { Stratum::Nominal };
     let mut config = SimConfig::default();
     if !hangs {
-        config.bubble = film(tools[tool].half_thickness_m);
+        config.bubble = BubbleConfig::film(tools[tool].half_thickness_m);
     }
     config.bubble.calibration_rad = tolerance.angle_deg.to_radians();
     config.bubble.calibration_m = tolerance.place_mm * 1e-3;

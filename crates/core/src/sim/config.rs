@@ -66,6 +66,22 @@ pub struct BubbleConfig {
     pub texture_seed: u64,
 }
 
+impl BubbleConfig {
+    /// A soap film that reaches the middle plane of a tool.
+    pub fn film(half_thickness_m: f64) -> Self {
+        Self {
+            // The free membrane was seen somewhat nearer than it is pressed on.
+            press_m: half_thickness_m + 3.5e-3,
+            dome_rise_m: 0.028,
+            dome_fullness: 0.0,
+            rim_tilt: 0.04,
+            pressure_per_m: 28.0,
+            stiffening: 0.0,
+            ..Self::default()
+        }
+    }
+}
+
 impl Default for BubbleConfig {
     fn default() -> Self {
         Self {

@@ -228,21 +228,10 @@ fn a_grasp_at_70_degrees_is_found_unless_the_range_is_the_labs() {
 
 #[test]
 fn a_soap_film_that_reaches_the_middle_plane_tells_the_angle_to_less_than_a_degree() {
-    let mut config = SimConfig::default();
-    config.bubble = BubbleConfig {
-        dome_rise_m: 0.028,
-        dome_fullness: 0.0,
-        rim_tilt: 0.04,
-        pressure_per_m: 28.0,
-        stiffening: 0.0,
-        ..config.bubble
-    };
     let error_deg = |grasp: u64| {
         let tool = grasp as usize % tools().len();
-        let config = SimConfig {
-            bubble: BubbleConfig { press_m: tools()[tool].half_thickness_m + 3.5e-3, ..config.bubble.clone() },
-            ..config.clone()
-        };
+        let bubble = BubbleConfig::film(tools()[tool].half_thickness_m);
+        let config = SimConfig { bubble, ..SimConfig::default() };
         let touch = Touch::felt(tool, random_grasp(grasp), grasp, &config);
         let found = touch.by(&JointConfig { range: Range::LAB }).unwrap();
         assert!(found.has_membrane());
